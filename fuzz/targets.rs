@@ -5,16 +5,16 @@ use std::fs;
 use std::path::Path;
 
 use glam::DVec3;
-use luminaire::geometry::Mesh;
-use luminaire::photometry::{self, Tolerance, eulumdat, lm63, tm33};
-use luminaire::scene::{Meter, Scene, Transport};
-use luxproof::engines::{ExternalReadings, Job, Station};
-use luxproof::import::{Options, import};
-use luxproof::record::{EngineName, MeterId, ProcedureId};
-use luxproof::report::{Detail, Report, Screen, Style, csv, junit, markdown, page, terminal};
-use luxproof::spec::{Budget, Case, Trust};
-use luxproof::trend::baseline::Baseline;
-use luxproof::trend::history::{History, changes, site};
+use luxproof_engines::{ExternalAnswers, Job, Sensor};
+use luxproof_model::{EngineName, MeterId, ProcedureId, Report};
+use luxproof_photometry::{Tolerance, eulumdat, lm63, tm33};
+use luxproof_report::{Detail, Letters, Screen, Style, csv, junit, markdown, page, terminal};
+use luxproof_scene::geometry::Mesh;
+use luxproof_scene::{Meter, Scene, Transport};
+use luxproof_scene_import::{Options, import};
+use luxproof_spec::{Budget, Case, Trust};
+use luxproof_trend::baseline::Baseline;
+use luxproof_trend::history::{History, changes, site};
 
 pub(crate) type Target = fn(&[u8]);
 
@@ -83,14 +83,15 @@ pub(crate) fn tm33(bytes: &[u8]) {
 /// Of any kind, whatever is let pass: what is read without tolerance is read with it, and is the same.
 pub(crate) fn gldf(bytes: &[u8]) {
     for name in ["any.gldf", "any.gldf#b", "any.xml#1", "any.ldt", "any.ies"] {
-        let read = |tolerance| photometry::read_tolerantly_by(Path::new(name), &|_| Ok(bytes.to_vec()), tolerance);
+        let read =
+            |tolerance| luxproof_photometry::read_tolerantly_by(Path::new(name), &|_| Ok(bytes.to_vec()), tolerance);
         match (read(Tolerance::Strict), read(Tolerance::Harmless)) {
             (Ok(strict), tolerant) => {
                 assert!(strict.distribution.flux().value() >= 0.0);
                 assert_eq!(tolerant.map(|read| read.distribution), Ok(strict.distribution));
             }
             (Err(error), Ok(tolerant)) => {
-                let is_told = tolerant.lints.iter().any(|lint| lint.code.starts_with(photometry::FORGIVEN));
+                let is_told = tolerant.lints.iter().any(|lint| lint.code.starts_with(luxproof_photometry::FORGIVEN));
                 assert!(is_told, "{error}");
                 assert_eq!(
                     lm63::write_2019(&tolerant).losses.iter().filter(|loss| loss.contains("intensit")).count(),
@@ -111,7 +112,7 @@ pub(crate) fn obj(mut bytes: &[u8]) {
 }
 
 /// A file of these bytes in a folder of its own, with what they may name beside it.
-fn kept<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
+fn parse_file<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
     const LAMP: &str = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 3 1 1 2 0 0 0\n1 1 0\n0 60 90\n0\n100 80 0\n";
     let folder = tempfile::tempdir().expect("there is a temporary folder");
     let path = folder.path().join(name);
@@ -122,36 +123,34 @@ fn kept<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
 
 /// As a stranger's; the message names the file.
 pub(crate) fn spec(bytes: &[u8]) {
-    if let Err(error) = kept("any.yaml", bytes, |path| Case::load_all(path, Trust::Stranger)) {
+    if let Err(error) = parse_file("any.yaml", bytes, |path| Case::load_all(path, Trust::Stranger)) {
         assert!(error.to_string().contains("any.yaml") || error.to_string().contains("lamp.ies"), "{error}");
     }
 }
 
-/// Also of another version, whose checksum nobody can know: every view can be drawn of it.
+/// A text is refused or read. Every view can be drawn of what has the form of a report, also with a wrong checksum.
 pub(crate) fn report(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
-    match Report::from_json(text) {
-        Ok(read) => {
-            let report = &read.report;
-            terminal(report, Screen::new(Style::Plain, Detail::All, None), None);
-            for view in [markdown(report, None), junit(report), csv(report), page(report, &[])] {
-                assert!(!view.is_empty());
-            }
-            report.exit();
-        }
-        Err(error) => assert!(!error.to_string().is_empty()),
+    if let Err(error) = luxproof_report_file::from_json(text) {
+        assert!(!error.to_string().is_empty());
     }
+    let Ok(report) = &serde_json::from_str::<Report>(text) else { return };
+    terminal(report, Screen::new(Style::Plain, Detail::All, Letters::Unicode, None), None);
+    for view in [markdown(report, None), junit(report), csv(report), page(report, &[])] {
+        assert!(!view.is_empty());
+    }
+    report.exit();
 }
 
 /// Also of formats that have no checksums: the site can be drawn of it.
 pub(crate) fn history(bytes: &[u8]) {
-    if let Ok(history) = kept("any.jsonl", bytes, History::read) {
+    if let Ok(history) = parse_file("any.jsonl", bytes, History::read) {
         site(&history, &changes(&history), &[]);
     }
 }
 
 pub(crate) fn baseline(bytes: &[u8]) {
-    if let Err(error) = kept("any.json", bytes, Baseline::read) {
+    if let Err(error) = parse_file("any.json", bytes, Baseline::read) {
         assert!(error.to_string().contains("any.json"), "{error}");
     }
 }
@@ -174,9 +173,9 @@ pub(crate) fn gltf_scene(bytes: &[u8]) {
 /// What is taken of a scene lies in its room and is written as it is; what is refused is refused with the file named.
 fn scene(name: &str, bytes: &[u8]) {
     let options = Options { leaves_out: true, trust: Trust::Stranger, ..Options::default() };
-    match kept(name, bytes, |path| import(path, &options)) {
+    match parse_file(name, bytes, |path| import(path, &options)) {
         Ok(imported) => {
-            let size_m = DVec3::from(imported.told.room.size_m);
+            let size_m = DVec3::from(imported.summary.room.size_m);
             let inside = |at: DVec3| at.cmpge(DVec3::ZERO).all() && at.cmple(size_m).all();
             assert!(size_m.is_finite() && inside(imported.place.lamp_m));
             for part in &imported.meshes {
@@ -185,7 +184,7 @@ fn scene(name: &str, bytes: &[u8]) {
                 let again = Mesh::parse_obj(&mut part.obj().as_bytes(), Path::new("again.obj"));
                 assert_eq!(again.expect("it is a mesh").triangles.len(), part.mesh.triangles.len());
             }
-            assert!(imported.told.to_string().contains(name));
+            assert!(imported.summary.to_string().contains(name));
         }
         Err(faults) => assert!(faults.to_string().contains("any."), "{faults}"),
     }
@@ -198,13 +197,14 @@ pub(crate) fn answer(bytes: &[u8]) {
         case: "any".to_owned(),
         procedure: ProcedureId::DirectIlluminance,
         scene: Scene::default(),
-        stations: (0..2).map(|k| Station { id: MeterId::new("m", k), meter }).collect(),
+        sensors: (0..2).map(|k| Sensor { id: MeterId::new("m", k), meter }).collect(),
         transport: Transport::Direct,
         budget: Budget::default(),
         seed: 1,
         settings: std::collections::BTreeMap::new(),
     };
-    if let Ok(measurement) = ExternalReadings::measured(bytes, &job, &EngineName::from("any")) {
+    let answers = ExternalAnswers::measurements(bytes, &[&job], &EngineName::from("any"));
+    for measurement in answers.into_iter().flatten().flatten() {
         assert_eq!(measurement.estimates.len(), 2);
         assert!(measurement.estimates.iter().all(|e| e.value.is_finite() && e.uncertainty.is_finite()));
     }

@@ -10,7 +10,7 @@ mod cachet_audit;
 
 #[test]
 fn the_document_holds_what_the_program_computes() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/cachet.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/cachet.md");
     let document = std::fs::read_to_string(path).unwrap();
     let report = cachet_audit::report().unwrap();
     let tables: Vec<&str> = report.trim_end().split("\n\n").collect();

@@ -7,10 +7,10 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
-use luminaire::geometry::{Reflectances, Room};
-use luminaire::photometry::{Goniometer, LuminousOpening, Photometry, TypeCLimits, lm63};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
-use luminaire::simulator::{Accuracy, Uncertainty, certified, illuminance};
+use luxproof_photometry::{Goniometer, LuminousOpening, Photometry, TypeCLimits, lm63};
+use luxproof_scene::geometry::{Reflectances, Room};
+use luxproof_scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
+use luxproof_simulator::{Accuracy, Uncertainty, certified, illuminance};
 
 fn file(kind: Goniometer, h: &[f64], v: &[f64], of: impl Fn(f64, f64) -> f64) -> Photometry {
     let words = |all: Vec<f64>| all.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");

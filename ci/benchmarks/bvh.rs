@@ -1,4 +1,4 @@
-//! Our part of `ci/benchmarks/bvh`: makes rooms and rays, and casts them when told so on its standard input.
+//! Our part of `ci/benchmarks/bvh`: makes rooms and rays, and casts them on a command on its standard input.
 //!
 //! `bvh FOLDER TRIANGLES...` writes each room as `TRIANGLES.vertices` and `TRIANGLES.faces` and its rays as `TRIANGLES.coherent` and
 //! `TRIANGLES.incoherent` (origin, direction, reach), all of 32 bits, so that Embree gets the very same. A line `closest 1000 coherent` or
@@ -9,7 +9,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use glam::DVec3;
-use luminaire::geometry::bvh::{Ray, TriangleBvh};
+use luxproof_scene::geometry::bvh::{Ray, TriangleBvh};
 
 const ROOM_M: DVec3 = DVec3::new(8.0, 6.0, 3.0);
 const RAYS: u32 = 1 << 20;

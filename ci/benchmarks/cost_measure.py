@@ -29,7 +29,7 @@ with tempfile.TemporaryDirectory() as folder, open(out, "a") as found:
             report = json.loads(done.stdout or "{}")
             for recording in report.get("recordings", []):
                 if recording["engine"] == name:
-                    row[name] = {k: recording.get(k) for k in ("procedure", "work_s", "wall_s", "looks", "notes", "method", "effort", "failure", "approximation")}
+                    row[name] = {k: recording.get(k) for k in ("procedure", "work_s", "wall_s", "stages", "notes", "method", "effort", "failure", "approximation")}
             row[f"exit_{name}"] = done.returncode
             shutil.rmtree(f"{folder}/out", ignore_errors=True)
         found.write(json.dumps(row) + "\n")

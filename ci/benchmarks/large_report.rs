@@ -8,9 +8,9 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use luxproof::judge::{Comparison, Verdict};
-use luxproof::record::{MeterId, ProcedureId, Reading, ReadingKey, Recording};
-use luxproof::report::{self, CaseRecord, ReadingRecord, Report, SpecRecord};
+use luxproof_model::{CaseRecord, ReadingRecord, Report, SpecRecord};
+use luxproof_model::{Comparison, Verdict};
+use luxproof_model::{MeterId, ProcedureId, Reading, ReadingKey, Recording};
 use serde_json::json;
 
 const ENGINES: [&str; 5] = ["simulator", "mitsuba", "radiance", "povray", "an-adapter"];
@@ -34,9 +34,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let clock = Instant::now();
     let mut report = synthetic(cases, procedures, meters)?;
     let made_s = clock.elapsed().as_secs_f64();
-    report.keep_anew(folder)?;
+    luxproof_report_file::keep_anew(&mut report, folder)?;
     let kept_s = clock.elapsed().as_secs_f64() - made_s;
-    report::keep_page(&report, &report::page(&report, &[]), folder)?;
+    luxproof_report::keep_page(&report, &luxproof_report::page(&report, &[]), folder)?;
     let page_s = clock.elapsed().as_secs_f64() - made_s - kept_s;
     println!(
         "{} comparisons made in {made_s:.1} s, report.json and comparisons.jsonl written in {kept_s:.1} s, its pages in {page_s:.1} s",
@@ -49,7 +49,7 @@ fn synthetic(cases: usize, procedures: &[ProcedureId], meters: usize) -> Result<
     let template: Comparison = serde_json::from_value(json!({
         "case": "", "procedure": "direct_illuminance", "engine": "", "model": "area", "meter": "plane[0]", "at_m": [0, 0, 0.8], "normal": [0, 0, 1],
         "gamma_deg": null, "c_deg": null, "quantity": "illuminance_lx", "value": 1, "std_error": 0.1234567,
-        "reference": {"value": 1, "uncertainty": 0.001, "basis": "exact", "source": "luminaire::simulator: hp collocation"},
+        "reference": {"value": 1, "uncertainty": 0.001, "basis": "simulator", "source": "luxproof_simulator: hp collocation"},
         "deviation": 0, "relative_deviation": 0, "tolerance": {"relative": 0.02, "absolute": 0.01}, "verdict": "pass", "diagnosis": null,
         "budget": {"components": [{"source": "monte_carlo", "uncertainty": 0.1234567, "shape": "normal"},
             {"source": "reference", "uncertainty": 0.00123456, "shape": "normal"}],
@@ -58,7 +58,7 @@ fn synthetic(cases: usize, procedures: &[ProcedureId], meters: usize) -> Result<
     }))?;
     let columns = (meters as f64).sqrt().ceil() as usize;
     let mut report = Report {
-        luxproof: 1,
+        luxproof: 2,
         tool_version: "0.1.0".into(),
         started: "2026-01-01T00:00:00Z".into(),
         ..Report::default()
@@ -74,12 +74,14 @@ fn synthetic(cases: usize, procedures: &[ProcedureId], meters: usize) -> Result<
     for case in 0..cases {
         let name = format!("corpus/case-{case:05}");
         report.cases.push(CaseRecord {
+            plan: None,
             name: name.clone(),
             spec: report.spec.clone(),
             policy: None,
             decision_rule: String::new(),
-            is_known: false,
+            is_calibration: false,
             has_bodies: false,
+            luminaire_models: vec![],
         });
         for (procedure, engine) in procedures.iter().flat_map(|p| ENGINES.map(|e| (*p, e))) {
             let key = ReadingKey::new(name.clone(), procedure, engine);

@@ -272,8 +272,14 @@ def answer(bug, job):
     return {"readings": readings}
 
 
+def reply(bug, request):
+    if request["verb"] == "probe":
+        return {"protocol": 2, "name": f"planted {bug}", "version": "1", "capabilities": ["obstacles"]}
+    return {"answers": [{"job": job["job"], **answer(bug, job)} for job in request["jobs"]]}
+
+
 if __name__ == "__main__":
     if sys.argv[1] == "--list":
         print("\n".join(BUGS))
     else:
-        json.dump(answer(sys.argv[1], json.load(sys.stdin)), sys.stdout)
+        json.dump(reply(sys.argv[1], json.load(sys.stdin)), sys.stdout)

@@ -55,7 +55,7 @@ def cell(report, procedure):
     own = [c for c in report["own"] if c["procedure"] == procedure]
     if not own:
         return "-"
-    verdicts = {v: sum(c["verdict"] == v for c in own) for v in ("fail", "inconclusive", "missing")}
+    verdicts = {v: sum(c["verdict"] == v for c in own) for v in ("fail", "undecided", "missing")}
     told = [f"{n} {v}" for v, n in verdicts.items() if n] or ["pass"]
     off = [abs(c["relative_deviation"]) for c in own if c["relative_deviation"] is not None]
     return f"{', '.join(told)}, {100 * max(off, default=0):.2g} %"
@@ -79,7 +79,7 @@ def against(earlier, report):
 def by_file(report):
     """pass, fail or missing by case, the worst of its meters."""
     worst = {}
-    rank = ["pass", "known_deviation", "inconclusive", "fail", "missing"]
+    rank = ["pass", "known_deviation", "undecided", "fail", "missing"]
     for c in report["own"]:
         case = c["case"].split("/")[-1]
         worst[case] = max(worst.get(case, "pass"), c["verdict"], key=rank.index)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-_SCHEMA = "luxproof comparisons 1"
+_SCHEMA = "luxproof comparisons 2"
 #: What of report.json holds its checksum, which is one of the first things that it says.
 _HEAD = 4096
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import pandas
 
 _KEY = ["case", "procedure", "engine"]
+#: The version of report.json that this package reads.
+_REPORT_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -87,12 +89,12 @@ class Report:
         """What cases that a spec compares are to each other, a row a meter.
 
         Columns: before, after (cases), procedure, engine, set, basis, meter; ratio.value, after over before (1), with
-        ratio.std_error and ratio.error_bound; agreement.deviation, .expanded, .allowed and .verdict; cancels. The means of sets
+        ratio.std_error and ratio.error_bound; agreement.deviation, .expanded, .allowed and .verdict; errors_cancel. The means of sets
         are in `data["ratios"]`.
         """
         own = ["before", "after", "procedure", "engine", "set", "basis"]
         rows = [{**{key: of[key] for key in own}, **meter} for of in self.data.get("ratios", []) for meter in of["meters"]]
-        return table(rows, [*own, "meter", "ratio.value", "cancels"], {"ratio.value": "1"})
+        return table(rows, [*own, "meter", "ratio.value", "errors_cancel"], {"ratio.value": "1"})
 
     @property
     def bias(self) -> pandas.DataFrame:
@@ -108,6 +110,10 @@ def load(path: str | os.PathLike[str]) -> Report:
     data = json.loads(file.read_text(encoding="utf-8"))
     if not isinstance(data, dict) or "luxproof" not in data or "comparisons" not in data:
         raise ValueError(f"{file} is no report of luxproof")
+    if data["luxproof"] != _REPORT_VERSION:
+        raise ValueError(
+            f"{file} is a report of version {data['luxproof']}; this package reads version {_REPORT_VERSION}: run its spec again"
+        )
     return Report(data, file.parent)
 
 

@@ -4,17 +4,36 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
 use glam::DVec3;
-use luminaire::geometry::configuration_factor::element_to_polygon;
-use luminaire::geometry::{Reflectances, Room};
-use luminaire::photometry::Photometry;
-use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
-use luminaire::simulator::{self, Accuracy};
+use luxproof_photometry::Photometry;
+use luxproof_scene::geometry::configuration_factor::element_to_polygon;
+use luxproof_scene::geometry::{Reflectances, Room};
+use luxproof_scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
+use luxproof_simulator::Accuracy;
 
 use super::{GAUSS, check, doubt, photometry, rows};
 
 const HORIZONTAL_LX: f64 = 10_000.0;
 const GROUND_CD_M2: f64 = 0.3 * HORIZONTAL_LX / PI;
 const SUN_ZENITH_DEG: f64 = 40.0;
+
+/// a to e of the types 1 to 15 of ISO 15469, its table 1.
+const TYPES: [[f64; 5]; 15] = [
+    [4.0, -0.7, 0.0, -1.0, 0.0],
+    [4.0, -0.7, 2.0, -1.5, 0.15],
+    [1.1, -0.8, 0.0, -1.0, 0.0],
+    [1.1, -0.8, 2.0, -1.5, 0.15],
+    [0.0, -1.0, 0.0, -1.0, 0.0],
+    [0.0, -1.0, 2.0, -1.5, 0.15],
+    [0.0, -1.0, 5.0, -2.5, 0.3],
+    [0.0, -1.0, 10.0, -3.0, 0.45],
+    [-1.0, -0.55, 2.0, -1.5, 0.15],
+    [-1.0, -0.55, 5.0, -2.5, 0.3],
+    [-1.0, -0.55, 10.0, -3.0, 0.45],
+    [-1.0, -0.32, 10.0, -3.0, 0.45],
+    [-1.0, -0.32, 16.0, -3.0, 0.3],
+    [-1.0, -0.15, 16.0, -3.0, 0.3],
+    [-1.0, -0.15, 24.0, -2.8, 0.15],
+];
 
 /// Skies of ISO 15469.
 #[derive(Clone, Copy, Debug)]
@@ -23,26 +42,51 @@ enum Kind {
     Uniform,
     Clear,
     TraditionalOvercast,
+    /// By its number, 1 to 15, and with a sun at another height.
+    Numbered(usize),
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Sky {
+pub(super) struct Sky {
     kind: Kind,
     sun_azimuth: f64,
+    sun_zenith: f64,
     scale: f64,
 }
 
 impl Sky {
     /// One that gives an open horizontal plane 10 000 lx, in closed form where there is one.
     fn new(kind: Kind, sun_deg: f64) -> Self {
-        let mut sky = Self { kind, sun_azimuth: sun_deg.to_radians(), scale: 1.0 };
+        Self::with_sun(kind, sun_deg, SUN_ZENITH_DEG)
+    }
+
+    /// One of the 16 types, by its number.
+    pub(super) fn numbered(number: usize, sun_deg: f64, zenith_deg: f64) -> Self {
+        let kind = if number == 16 { Kind::TraditionalOvercast } else { Kind::Numbered(number) };
+        Self::with_sun(kind, sun_deg, zenith_deg)
+    }
+
+    fn with_sun(kind: Kind, sun_deg: f64, zenith_deg: f64) -> Self {
+        let (sun_azimuth, sun_zenith) = (sun_deg.to_radians(), zenith_deg.to_radians());
+        let mut sky = Self { kind, sun_azimuth, sun_zenith, scale: 1.0 };
         let horizontal = match kind {
             Kind::Uniform => PI,
             Kind::TraditionalOvercast => 7.0 * PI / 9.0,
-            Kind::Overcast | Kind::Clear => {
+            Kind::Overcast | Kind::Clear | Kind::Numbered(_) => {
                 let upwards = Meter { position_m: DVec3::ZERO, normal: DVec3::Z };
                 let half_turn = [0.0, FRAC_PI_2, PI, 1.5 * PI, TAU];
-                over_directions(&upwards, &sky, &half_turn, |_| Some([0.0, FRAC_PI_2]), |_| 1.0)
+                let mut sum = 0.0;
+                over_directions(
+                    &upwards,
+                    &sky,
+                    &half_turn,
+                    |_| Some([0.0, FRAC_PI_2]),
+                    30,
+                    |towards, part| {
+                        sum += part * sky.luminance(towards);
+                    },
+                );
+                sum
             }
         };
         sky.scale = HORIZONTAL_LX / horizontal;
@@ -50,7 +94,7 @@ impl Sky {
     }
 
     fn sun(&self) -> DVec3 {
-        direction(SUN_ZENITH_DEG.to_radians(), self.sun_azimuth)
+        direction(self.sun_zenith, self.sun_azimuth)
     }
 
     /// In cd/m² towards a direction, or of the ground.
@@ -61,9 +105,10 @@ impl Sky {
         }
         let [a, b, c, d, e] = match self.kind {
             Kind::TraditionalOvercast => return self.scale * (1.0 + 2.0 * zenith.cos()) / 3.0,
-            Kind::Overcast => [4.0, -0.7, 0.0, -1.0, 0.0],
-            Kind::Uniform => [0.0, -1.0, 0.0, -1.0, 0.0],
-            Kind::Clear => [-1.0, -0.32, 10.0, -3.0, 0.45],
+            Kind::Overcast => TYPES[0],
+            Kind::Uniform => TYPES[4],
+            Kind::Clear => TYPES[11],
+            Kind::Numbered(number) => TYPES[number - 1],
         };
         let chi = towards.angle_between(self.sun());
         let gradation = 1.0 + a * (b / zenith.cos()).exp();
@@ -91,53 +136,67 @@ fn glass(incidence: f64) -> f64 {
     faces.into_iter().map(of).sum::<f64>() / 2.0
 }
 
-/// The integral of L tau cos over the directions of each azimuth whose zenith angles lie between two bounds.
+/// The integral of cos over the directions with zenith angles between two bounds in each azimuth, in parts.
 ///
-/// Bounds are smooth between the azimuths `ends`; a cusp at the sun and a jump at the horizon are cut at.
+/// Calls `add` with every direction and its part; `add` multiplies by luminance and transmittance. Bounds are smooth
+/// between the azimuths `ends`; a cusp at the sun and a jump at the horizon are cut at.
 fn over_directions(
     meter: &Meter,
     sky: &Sky,
     ends: &[f64],
     bounds: impl Fn(f64) -> Option<[f64; 2]>,
-    passed: impl Fn(DVec3) -> f64,
-) -> f64 {
+    panels: u32,
+    mut add: impl FnMut(DVec3, f64),
+) {
     let mut azimuths = ends.to_vec();
-    if matches!(sky.kind, Kind::Clear) {
+    if matches!(sky.kind, Kind::Clear | Kind::Numbered(_)) {
         azimuths.extend((-1..=1).map(|turn| sky.sun_azimuth + TAU * f64::from(turn)));
     }
     let (from, to) = (ends[0], ends[ends.len() - 1]);
     azimuths.retain(|a| (from..=to).contains(a));
     azimuths.sort_by(f64::total_cmp);
-    let zeniths = [0.0, SUN_ZENITH_DEG.to_radians(), FRAC_PI_2, PI];
-    let mut sum = 0.0;
+    let zeniths = [0.0, sky.sun_zenith, FRAC_PI_2, PI];
     for pair in azimuths.windows(2) {
-        for (azimuth, width) in nodes(pair[0], pair[1]) {
+        for (azimuth, width) in nodes(pair[0], pair[1], panels) {
             let Some([low, high]) = bounds(azimuth) else { continue };
             for zone in zeniths.windows(2) {
                 let (low, high) = (low.max(zone[0]), high.min(zone[1]));
                 if low >= high {
                     continue;
                 }
-                for (zenith, height) in nodes(low, high) {
+                for (zenith, height) in nodes(low, high, panels) {
                     let towards = direction(zenith, azimuth);
                     let received = towards.dot(meter.normal).max(0.0);
-                    sum += width * height * zenith.sin() * received * sky.luminance(towards) * passed(towards);
+                    add(towards, width * height * zenith.sin() * received);
                 }
             }
         }
     }
-    sum
 }
 
-/// Composite Gauss-Legendre quadrature.
-fn nodes(low: f64, high: f64) -> impl Iterator<Item = (f64, f64)> {
-    let panels = 10;
-    let step = (high - low) / f64::from(panels);
-    (0..panels).flat_map(move |k| GAUSS.map(|(x, w)| (low + (f64::from(k) + x) * step, w * step)))
+/// Composite Gauss-Legendre quadrature, dense towards both ends, where cusps lie.
+fn nodes(low: f64, high: f64, panels: u32) -> impl Iterator<Item = (f64, f64)> {
+    let width = high - low;
+    (0..panels).flat_map(move |k| {
+        GAUSS.map(|(x, w)| {
+            let u = (f64::from(k) + x) / f64::from(panels);
+            (low + width * u * u * (3.0 - 2.0 * u), width * 6.0 * u * (1.0 - u) * w / f64::from(panels))
+        })
+    })
 }
 
 /// The illuminance by what shows through all of some flat convex frames, the last of them the opening's own.
 fn through(meter: &Meter, frames: &[[DVec3; 4]], sky: &Sky, passed: impl Fn(DVec3) -> f64) -> f64 {
+    through_each(meter, frames, std::slice::from_ref(sky), passed)[0]
+}
+
+/// The same under each of some skies with the same sun; the first is one of those with a sun, if any is.
+pub(super) fn through_each(
+    meter: &Meter,
+    frames: &[[DVec3; 4]],
+    skies: &[Sky],
+    passed: impl Fn(DVec3) -> f64,
+) -> Vec<f64> {
     let frames: Vec<[DVec3; 4]> = frames.iter().map(|f| f.map(|c| c - meter.position_m)).collect();
     // Azimuths count from the middle of the first frame, and all round where a frame is straight above.
     let middle: DVec3 = frames[0].iter().sum();
@@ -152,7 +211,16 @@ fn through(meter: &Meter, frames: &[[DVec3; 4]], sky: &Sky, passed: impl Fn(DVec
         let shown = frames.iter().map(|f| zenith_angles(f, azimuth));
         shown.reduce(|a, b| Some([a?[0].max(b?[0]), a?[1].min(b?[1])])).flatten()
     };
-    over_directions(meter, sky, &ends, bounds, passed)
+    let mut sums = vec![0.0; skies.len()];
+    over_directions(meter, &skies[0], &ends, bounds, 10, |towards, part| {
+        if part > 0.0 {
+            let part = part * passed(towards);
+            for (sum, sky) in sums.iter_mut().zip(skies) {
+                *sum += part * sky.luminance(towards);
+            }
+        }
+    });
+    sums
 }
 
 /// Between which zenith angles a frame, relative to the meter, is seen in one azimuth.
@@ -177,26 +245,26 @@ fn zenith_angles(frame: &[DVec3; 4], azimuth: f64) -> Option<[f64; 2]> {
 }
 
 /// A roof opening of the cases of chapters 5.9 and 5.10, turned about its middle.
-fn roof(side_m: f64, turn_deg: f64) -> [DVec3; 4] {
+pub(super) fn roof(side_m: f64, turn_deg: f64) -> [DVec3; 4] {
     let turn = orientation(turn_deg, 0.0, 0.0);
     [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
         .map(|[x, y]| DVec3::new(4.0, 4.0, 3.5) + turn * DVec3::new(x, y, 0.0) * side_m / 2.0)
 }
 
 /// An upright frame in the plane of an x.
-fn upright(x: f64, [left, right]: [f64; 2], [low, high]: [f64; 2]) -> [DVec3; 4] {
+pub(super) fn upright(x: f64, [left, right]: [f64; 2], [low, high]: [f64; 2]) -> [DVec3; 4] {
     [[left, low], [right, low], [right, high], [left, high]].map(|[y, z]| DVec3::new(x, y, z))
 }
 
-fn clear(_: DVec3) -> f64 {
+pub(super) fn clear(_: DVec3) -> f64 {
     1.0
 }
 
-fn of_roof(towards: DVec3) -> f64 {
+pub(super) fn of_roof(towards: DVec3) -> f64 {
     glass(towards.z.acos())
 }
 
-fn of_facade(towards: DVec3) -> f64 {
+pub(super) fn of_facade(towards: DVec3) -> f64 {
     glass(towards.x.acos())
 }
 
@@ -285,7 +353,7 @@ fn the_simulators_bounds_hold_where_the_horizon_shows_through_a_hole() {
         [2.6, 2.8, 3.0, 3.1].iter().flat_map(|z| [meter(4.0, 2.0, *z), meter(3.0, 5.5, *z)]).collect();
     for relative_error in [1e-2, 3e-3, 1e-3] {
         let accuracy = Accuracy { relative_error, seed: 1 };
-        let solution = simulator::illuminance(&scene, &meters, Transport::Direct, &accuracy).unwrap();
+        let solution = luxproof_simulator::illuminance(&scene, &meters, Transport::Direct, &accuracy).unwrap();
         for (meter, found) in meters.iter().zip(&solution.estimates) {
             let (law, value) = (through(meter, &frames, &sky, clear), found.illuminance.value());
             // And what the table's straight lines leave out.

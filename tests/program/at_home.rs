@@ -35,6 +35,41 @@ fn a_first_spec_runs_as_it_is_written_and_is_not_replaced() {
     assert!(!folder.path("c.yaml").exists());
 }
 
+/// A panel of 0.6 m; with `upwards`, half of its light goes up.
+fn panel(upwards: bool) -> String {
+    let angles = if upwards { "0 60 90 120 180" } else { "0 45 60 75 90" };
+    let candela = if upwards { "100 80 0 80 100" } else { "100 71 50 26 0" };
+    format!("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 5 1 1 2 0.6 0.6 0\n1 1 0\n{angles}\n0\n{candela}\n")
+}
+
+#[test]
+fn a_first_spec_takes_mounting_model_and_meters_from_the_file_and_the_room() {
+    let folder = Folder::new(&[("panel.ies", &panel(false)), ("pendant.ies", &panel(true)), ("point.ies", LAMP)]);
+    let office = |spec: &str, file: &str, size: &str| {
+        folder.luxproof(&["init", spec, "--photometry", file, "--size", size, "--yes"]).exits(0);
+        let check = folder.luxproof(&["check", spec]).exits(0);
+        assert!(check.stderr.is_empty(), "{}", check.stderr);
+        (folder.read(spec), check.stdout)
+    };
+    // EN 12464-1: 4 m x 3 m inside the margin; p = 0.2 x 5^log10(4) = 0.527 m.
+    let (text, check) = office("a.yaml", "panel.ies", "5,4,2.8");
+    assert!(text.contains("8 x 6 points by EN 12464-1"), "{text}");
+    assert!(text.contains("surface: {of: floor, distance_m: 0.75, margin_m: 0.5}"), "{text}");
+    assert!(text.contains("at_m: [2.5, 2, 2.7]"), "{text}");
+    assert!(text.contains("model: auto ") && text.contains("# area here: desk["), "{text}");
+    assert!(check.contains("direct_illuminance at 48 meters") && check.contains("model: area (auto)"), "{check}");
+    // A luminaire that shines upwards hangs; one without an opening is a point; a corridor has no margin.
+    let (text, _) = office("b.yaml", "pendant.ies", "5,4,2.8");
+    assert!(text.contains("at_m: [2.5, 2, 2.3]"), "{text}");
+    let (text, _) = office("c.yaml", "point.ies", "9,1.8,2.8");
+    assert!(text.contains("# point here: the file has no opening") && text.contains("margin_m: 0}"), "{text}");
+    // What does not fit is refused, and nothing is written.
+    let args = ["init", "d.yaml", "--photometry", "panel.ies", "--size", "0.5,4,3", "--yes"];
+    let refusal = folder.luxproof(&args).exits(2).message();
+    assert!(refusal.contains("does not fit into a room of 0.5 x 4 x 3 m"), "{refusal}");
+    assert!(!folder.path("d.yaml").exists());
+}
+
 #[test]
 fn a_first_spec_of_any_room_is_sound() {
     for size in ["6,4,3", "1,1,1", "0.3,0.2,0.2", "100,40,12", "3.33,7.77,2.51"] {
@@ -91,7 +126,7 @@ fn every_run_leaves_a_page_and_open_tells_where() {
     fs::remove_file(folder.path("out/report.html")).unwrap();
     folder.luxproof(&["open", "out/report.json", "--no-browser"]).exits(0).prints("out/report.html");
     assert_eq!(folder.read("out/report.html"), page);
-    folder.luxproof(&["open", "cache", "--no-browser"]).exits(2).complains("holds no report.json");
+    folder.luxproof(&["open", "cache", "--no-browser"]).exits(2).complains("contains no report.json");
 }
 
 #[test]

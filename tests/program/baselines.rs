@@ -3,9 +3,7 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-use sha2::{Digest, Sha256};
-
-use crate::support::{Answer, Folder, LAMP, OWN, ROOM, TWO_METERS};
+use crate::support::{Answer, Folder, LAMP, MINE, OWN, ROOM, TWO_METERS, adapter, sealed};
 
 /// As a baseline has it of the program that is tested.
 const VERSION: &str = concat!("\"version\": \"", env!("CARGO_PKG_VERSION"), "\"");
@@ -55,12 +53,13 @@ fn an_accepted_run_repeats_and_keeps_its_reason() {
 #[test]
 fn every_view_tells_what_departs_from_the_baseline() {
     let room = accepted();
-    room.forge("baselines/spec.json", VERSION, OTHER_VERSION);
+    room.edit("lamp.ies", "100 80 0", "110 80 0");
     run(&room, &["--baseline", "baselines"]).exits(1);
     for (view, says) in [
         ("terminal", "Baseline baselines/spec.json: 4 REFUSED"),
+        ("terminal", "exit 1: the run differs from its baseline baselines/spec.json: 4 REFUSED"),
         ("markdown", "Baseline baselines/spec.json: 4 REFUSED"),
-        ("junit", "<failure message=\"REFUSED\">version: 0.0.1 before"),
+        ("junit", "<failure message=\"REFUSED\">task: "),
         ("html", "4 REFUSED"),
         ("json", "\"is_as_accepted\": false"),
     ] {
@@ -77,14 +76,95 @@ fn others_may_read_a_baseline_as_they_may_any_new_file() {
 }
 
 #[test]
-fn a_baseline_of_another_spec_or_version_is_refused() {
+fn a_baseline_of_another_task_is_refused_and_other_words_or_another_version_are_no_other_task() {
     let room = accepted();
     room.forge("baselines/spec.json", VERSION, OTHER_VERSION);
-    run(&room, &["--baseline", "baselines"]).exits(1).prints("REFUSED").prints("version: 0.0.1 before");
+    room.edit("spec.yaml", "title: a test room", "title: the same room under another title");
+    let same = run(&room, &["--baseline", "baselines"]).exits(0).prints("4 unchanged");
+    same.prints("within noise: iesna version: 0.0.1 before");
 
-    room.forge("baselines/spec.json", OTHER_VERSION, VERSION);
     room.edit("lamp.ies", "100 80 0", "110 80 0");
-    run(&room, &["--baseline", "baselines"]).exits(1).prints("REFUSED").prints("spec: ");
+    run(&room, &["--baseline", "baselines"]).exits(1).prints("REFUSED").prints("task: ");
+    // The review shows what was accepted beside what is now.
+    let review = room.luxproof(&["accept", "out", "--all", "--reason", "a brighter lamp"]).exits(0);
+    assert!(review.stdout.matches(" old ").count() >= 8, "{}", review.stdout);
+    run(&room, &["--baseline", "baselines"]).exits(0).prints("4 unchanged");
+}
+
+/// A renderer of the user: its version, a factor of its values, and whether obstacles cast shadows.
+fn renderer(version: &str, factor: f64, has_shadows: bool) -> String {
+    let hidden = if has_shadows { "is_hidden(lamp, meter, box)" } else { "False" };
+    let shadows = "
+def is_hidden(lamp, meter, box):
+    near, far = 0.0, 1.0
+    for p, q, a, b in zip(meter[\"position_m\"], lamp[\"position_m\"], box[\"min_m\"], box[\"max_m\"]):
+        if abs(q - p) < 1e-12:
+            if not a < p < b:
+                return False
+            continue
+        one, two = sorted(((a - p) / (q - p), (b - p) / (q - p)))
+        near, far = max(near, one), min(far, two)
+    return near < far
+
+
+def answer(job):";
+    let (before, rest) =
+        adapter().split_once("    if job[\"obstacles\"]:\n").map(|(a, b)| (a.to_owned(), b.to_owned())).unwrap();
+    let (_, rest) = rest.split_once('\n').unwrap();
+    (before + rest)
+        .replace("\ndef answer(job):", shadows)
+        .replace("[\"batch\"]", "[\"batch\", \"obstacles\"]")
+        .replace("\"version\": \"1\"", &format!("\"version\": \"{version}\""))
+        .replace(
+            "illuminance_lx(job[\"luminaires\"], meter)",
+            &format!(
+                "{factor} * illuminance_lx([lamp for lamp in job[\"luminaires\"] \
+                 if not any({hidden} for box in job[\"obstacles\"])], meter)"
+            ),
+        )
+}
+
+#[test]
+fn a_renderer_under_development_has_one_baseline_over_its_versions() {
+    let spec = "luxproof: 1
+room:
+  size_m: [6, 4, 3]
+  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.7}
+obstacles:
+  - box: {min_m: [1.5, 1.5, 1.2], max_m: [2.5, 2.5, 1.4], reflectance: 0.4}
+luminaires:
+  - {id: one, photometry: lamp.ies, at_m: [2, 2, 2.5]}
+  - {id: two, photometry: lamp.ies, at_m: [4.5, 2, 2.5]}
+meters:
+  plane: {points_m: [[2, 2, 0.8], [2.2, 1.9, 0.8], [4, 2, 0.8], [5, 3, 0.8]], normal: [0, 0, 1]}
+tolerances:
+  direct_illuminance: {relative: 0.01}
+procedures:
+  direct_illuminance: {meters: plane}
+";
+    let program = renderer("1.0", 1.0, true);
+    let room = Folder::new(&[("spec.yaml", &[spec, MINE].concat()), ("lamp.ies", LAMP), ("adapter.py", &program)]);
+    let run = |more: &[&str]| room.run(&[&["--engines", "simulator,mine", "--no-cache"], more].concat());
+    run(&[]).exits(0);
+    room.luxproof(&["accept", "out", "--all", "--reason", "release 1.0"]).exits(0).prints("3 accepted");
+    // The last version also fails its tolerance, and the run names the cause.
+    for (version, factor, has_shadows, code, says) in [
+        ("1.0", 1.0, true, 0, &["3 unchanged"][..]),
+        ("1.1", 1.0, true, 0, &["3 unchanged", "within noise: mine version: "]),
+        ("2.0", 1.004, true, 1, &["2 unchanged, 1 SHIFTED", "mean +0.4000 %", "every reading times 1.00400"]),
+        ("2.1", 1.0, false, 1, &["1 SHIFTED", "cause: bodies hide nothing"]),
+    ] {
+        room.write("adapter.py", &renderer(version, factor, has_shadows));
+        let answer = run(&["--baseline", "baselines"]).exits(code);
+        // The last line may be wrapped.
+        let end = answer.stdout.rsplit("\nexit ").next().unwrap_or_default();
+        let last = end.split_whitespace().collect::<Vec<_>>().join(" ");
+        let answer = says.iter().fold(answer, |answer, text| answer.prints(text));
+        let starts = last.starts_with(&format!("{code}: "));
+        let explains = last.contains("differs from its baseline")
+            && last.contains("1 SHIFTED (first spec direct_illuminance mine: mean +");
+        assert!(starts && explains == (code == 1), "{version}: {last}\n{}", answer.stdout);
+    }
 }
 
 #[test]
@@ -102,8 +182,8 @@ fn a_baseline_that_was_edited_torn_or_moved_is_refused_before_anything_is_measur
     refused("was edited");
     room.write("baselines/spec.json", &sound[..sound.len() / 2]);
     refused("cut short");
-    room.edit("baselines/spec.json", "baseline 2", "baseline 3");
-    refused("`luxproof baseline 3`");
+    room.edit("baselines/spec.json", "baseline 3", "baseline 4");
+    refused("`luxproof baseline 4`");
     room.edit("baselines/spec.json", "\"key\":\"spec\"", "\"key\":\"other\"");
     refused("`other`");
     // That of another spec under this one's name.
@@ -126,40 +206,28 @@ fn a_baseline_that_lacks_meters_accepts_nothing_of_them() {
     // The first entry's readings but the last.
     let last = baseline.split("\n        {").nth(2).and_then(|rest| rest.split('\n').next()).unwrap().to_owned();
     room.forge("baselines/spec.json", &format!(",\n        {{{last}\n      ]"), "\n      ]");
-    run(&room, &["--baseline", "baselines"]).exits(1).prints("there is nothing to hold plane[1] against");
+    run(&room, &["--baseline", "baselines"]).exits(1).prints("no baseline yet for plane[1]");
 }
 
 #[test]
-fn a_report_of_another_version_is_told_and_one_that_does_not_fit_refused() {
+fn a_report_of_another_version_is_refused() {
     let room = room();
     run(&room, &[]).exits(0);
-    room.edit("out/report.json", "\"luxproof\": 1", "\"luxproof\": 2");
-    let told = "is a report of version 2 where this luxproof reads version 1";
+    room.edit("out/report.json", "\"luxproof\": 2", "\"luxproof\": 1");
+    let refusal = "is a report of version 1, written by luxproof 0.1.0; this luxproof reads version 2";
     for command in [
         &["report", "out/report.json"][..],
         &["diff", "out", "out"],
         &["accept", "out", "--all", "--reason", "it is right"],
         &["history", "add", "out/report.json", "--history", "nights.jsonl"],
     ] {
-        room.luxproof(command).exits(0).complains(told);
+        let answer = room.luxproof(command).exits(2);
+        assert!(answer.message().contains(refusal), "{answer:?}");
     }
     room.edit("out/report.json", "\"readings\"", "\"values\"");
-    room.luxproof(&["diff", "out", "out"]).exits(2).complains("version 2").complains("missing field `readings`");
+    let answer = room.luxproof(&["diff", "out", "out"]).exits(2);
+    assert!(answer.message().contains(refusal), "{answer:?}");
     room.luxproof(&["report", "spec.yaml"]).exits(2).complains("is no report of luxproof");
-}
-
-/// A report as luxproof would have written it: times and the checksum itself do not count.
-fn sealed(mut report: serde_json::Value) -> String {
-    report["checksum"] = "".into();
-    let mut counted = report.to_string();
-    for name in ["\"checksum\"", "\"started\"", "\"wall_s\""] {
-        let mut parts = counted.split(name);
-        let first = parts.next().unwrap_or_default().to_owned();
-        counted = parts.fold(first, |said, part| said + name + &part[part.find([',', '}']).unwrap()..]);
-    }
-    let checksum = Sha256::digest(counted);
-    report["checksum"] = checksum.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat().into();
-    report.to_string()
 }
 
 #[test]
@@ -232,8 +300,16 @@ fn what_is_accepted_anew_every_night_is_a_drift_in_the_history_still_and_fails_w
     drawn(&["--deny", "change", "--since", "8"]).exits(0);
     // Nothing new was noticed on the last night.
     drawn(&["--deny", "any"]).exits(0);
-    drawn(&["--since", "8"]).exits(2);
     assert!(room.read("site/index.html").contains("since 2026-01-11"));
+    // A failed verdict is denied by default.
+    let mut report = first;
+    report["comparisons"][0]["verdict"] = "fail".into();
+    room.write("out/report.json", &sealed(report));
+    room.luxproof(&["history", "add", "out/report.json", "--history", "nights.jsonl", "--night", "2026-01-19"])
+        .exits(0);
+    drawn(&[]).exits(1).prints("2026-01-19 ").prints(": 1 failed verdict");
+    drawn(&["--deny", "change"]).exits(1).prints(": 1 failed verdict");
+    drawn(&["--deny", "none"]).exits(0);
 }
 
 #[test]

@@ -124,9 +124,9 @@ fn a_byte_that_is_flipped_missing_or_added_is_found_and_its_file_named() {
     let made = bundled(OWN, "bundle");
     let folder = made.path("bundle");
     let verify = || made.luxproof(&["reproduce", "bundle"]).exits(2);
-    let told = |what: &str| {
-        let told = verify().said();
-        assert!(told.contains(what), "no `{what}` in {told}");
+    let reported = |what: &str| {
+        let reported = verify().message();
+        assert!(reported.contains(what), "no `{what}` in {reported}");
     };
     for path in files(&folder) {
         let (name, bytes) = (path.strip_prefix(&folder).unwrap().display().to_string(), fs::read(&path).unwrap());
@@ -134,20 +134,20 @@ fn a_byte_that_is_flipped_missing_or_added_is_found_and_its_file_named() {
             let mut flipped = bytes.clone();
             flipped[at] ^= 1;
             fs::write(&path, flipped).unwrap();
-            told(&format!("{name} has changed"));
+            reported(&format!("{name} has changed"));
         }
         fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
-        told(&format!("{name} has changed"));
+        reported(&format!("{name} has changed"));
         fs::remove_file(&path).unwrap();
         let missing = format!("{name} is missing");
-        told(if name == "SHA256SUMS" { "it holds no SHA256SUMS" } else { &missing });
+        reported(if name == "SHA256SUMS" { "it holds no SHA256SUMS" } else { &missing });
         fs::write(&path, bytes).unwrap();
     }
     made.write("bundle/inputs/more", "");
-    told("inputs/more was added");
+    reported("inputs/more was added");
     fs::remove_file(made.path("bundle/inputs/more")).unwrap();
     symlink("/etc/passwd", made.path("bundle/inputs/more")).unwrap();
-    told("inputs/more was added: it is no regular file");
+    reported("inputs/more was added: it is no regular file");
     fs::remove_file(made.path("bundle/inputs/more")).unwrap();
     made.luxproof(&["reproduce", "bundle", "--verify"]).exits(0);
     assert!(!made.path("luxproof-out").exists());
@@ -180,14 +180,14 @@ fn a_zip_leaves_nothing_beside_its_own_place() {
         archive.start_file(name, stored).unwrap();
         archive.write_all(b"evil").unwrap();
         archive.finish().unwrap();
-        let told = folder.luxproof(&["reproduce", "evil.zip"]).exits(2).said();
-        assert!(told.contains("outside of the bundle") || told.contains("no SHA256SUMS"), "{name}: {told}");
+        let reported = folder.luxproof(&["reproduce", "evil.zip"]).exits(2).message();
+        assert!(reported.contains("outside of the bundle") || reported.contains("no SHA256SUMS"), "{name}: {reported}");
         assert!(!folder.path("outside").exists(), "{name}");
     }
     let mut archive = ZipWriter::new(File::create(folder.path("evil.zip")).unwrap());
     archive.add_symlink("link", "/etc/passwd", stored).unwrap();
     archive.finish().unwrap();
-    assert!(folder.luxproof(&["reproduce", "evil.zip"]).exits(2).said().contains("no regular file"));
+    assert!(folder.luxproof(&["reproduce", "evil.zip"]).exits(2).message().contains("no regular file"));
     fs::write(folder.path("none.zip"), "PK").unwrap();
     folder.luxproof(&["reproduce", "none.zip"]).exits(2);
 }
@@ -203,13 +203,13 @@ fn a_strangers_bundle_names_no_file_out_of_it_and_another_input_is_another_run()
         let made = bundled(OWN, "bundle");
         made.edit("bundle/inputs/specs/spec.yaml", "../lamps/tilted lamp.ies", &to);
         list_anew(&made.path("bundle"));
-        let told = made.luxproof(&["reproduce", "bundle"]).exits(2).said();
-        assert!(told.contains(says), "{told}");
+        let reported = made.luxproof(&["reproduce", "bundle"]).exits(2).message();
+        assert!(reported.contains(says), "{reported}");
     }
     let made = bundled(OWN, "bundle");
     made.edit("bundle/inputs/lamps/tilted lamp.ies", "100 80 10 5", "101 80 10 5");
     list_anew(&made.path("bundle"));
-    made.luxproof(&["reproduce", "bundle"]).exits(1).prints("not reproduced").prints("DIFFERS; spec: ");
+    made.luxproof(&["reproduce", "bundle"]).exits(1).prints("not reproduced").prints("DIFFERS; task: ");
 }
 
 #[test]
@@ -218,8 +218,11 @@ fn a_program_of_a_bundle_is_packed_and_runs_only_for_who_trusts_it() {
     let made = Folder::new(&[("spec.yaml", &text), ("lamp.ies", LAMP), ("adapter.py", &adapter())]);
     made.run(&["--engines", "mine"]).exits(0);
     made.luxproof(&["bundle", "out", "--out", "bundle"]).exits(0);
-    let told = made.luxproof(&["reproduce", "bundle"]).exits(2).said();
-    assert!(told.contains("engines.mine.command: it would run a program") && told.contains("--trusted"), "{told}");
+    let reported = made.luxproof(&["reproduce", "bundle"]).exits(2).message();
+    assert!(
+        reported.contains("engines.mine.command: it would run a program") && reported.contains("--trusted"),
+        "{reported}"
+    );
     fs::remove_file(made.path("adapter.py")).unwrap();
     made.luxproof(&["reproduce", "bundle", "--trusted"]).exits(0).prints("reproduced");
     made.luxproof(&["reproduce", "bundle", "--trusted", "--untrusted"]).exits(2).complains("contradict");
@@ -241,12 +244,12 @@ fn what_is_no_longer_what_was_run_is_not_bundled() {
     // A file that is named from the root would lie elsewhere.
     folder.edit("spec.yaml", "lamp.ies", &folder.path("lamp.ies").display().to_string());
     folder.run(&["--engines", OWN]).exits(0);
-    let told = folder.luxproof(&["bundle", "out"]).exits(2).said();
-    assert!(told.contains("relative to the spec"), "{told}");
+    let reported = folder.luxproof(&["bundle", "out"]).exits(2).message();
+    assert!(reported.contains("relative to the spec"), "{reported}");
 }
 
 #[test]
-fn radiance_reads_the_same_bytes_again_and_its_absence_is_told() {
+fn radiance_reads_the_same_bytes_again_and_its_absence_is_reported() {
     let made = bundled("simulator,iesna,radiance", "bundle");
     let answer = made.luxproof(&["reproduce", "bundle", "--format", "json"]).exits(0).json();
     let read = answer["rows"].as_array().unwrap().iter().filter(|row| row["engine"] == "radiance");
@@ -291,8 +294,9 @@ fn a_papers_tables_come_out_cell_by_cell_under_their_rounding() {
         .exits(0)
         .prints("A paper: 2 of 2 printed cells come out again within their rounding");
     folder.write("table.yaml", &TABLE.replace("FIRST", &format!("{:.1}", first + 0.1)));
-    let told = folder.luxproof(&["reproduce", "table.yaml"]).exits(1).prints("1 of 2 printed cells").prints("1 beyond");
-    assert_eq!(told.stdout.lines().filter(|line| line.contains("inverse_square")).count(), 2, "{told:?}");
+    let reported =
+        folder.luxproof(&["reproduce", "table.yaml"]).exits(1).prints("1 of 2 printed cells").prints("1 beyond");
+    assert_eq!(reported.stdout.lines().filter(|line| line.contains("inverse_square")).count(), 2, "{reported:?}");
     folder.edit("table.yaml", "spec: spec.yaml\n", "");
     folder.luxproof(&["reproduce", "table.yaml"]).exits(2).complains("names no spec");
     folder.edit("table.yaml", "citation", "spec: other.yaml\ncitation");

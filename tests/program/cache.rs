@@ -8,16 +8,15 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{Answer, Folder, SKEW_LAMP, SKEW_ROOM, adapter_of_version_one, is_night};
+use crate::support::{Answer, Folder, SKEW_LAMP, SKEW_ROOM, adapter_with_lines_before_readings, is_night};
 
 struct Lab(Folder);
 
 impl Lab {
-    /// The example adapter, which first notes that it was started.
+    /// The example adapter, which first notes that it was started for a reading.
     fn new() -> Self {
-        let spec =
-            SKEW_ROOM.to_owned() + "engines:\n  mine: {command: [python3, '-I', '-S', adapter.py], protocol: 1}\n";
-        let adapter = "open('starts', 'a').write('started\\n')\n".to_owned() + &adapter_of_version_one();
+        let spec = SKEW_ROOM.to_owned() + "engines:\n  mine: {command: [python3, '-I', '-S', adapter.py]}\n";
+        let adapter = adapter_with_lines_before_readings("open('starts', 'a').write('started\\n')\n");
         Self(Folder::new(&[("spec.yaml", &spec), ("lamp.ies", SKEW_LAMP), ("adapter.py", &adapter)]))
     }
 
@@ -31,7 +30,7 @@ impl Lab {
     }
 
     /// Every file of readings, byte by byte, and the report without the times that a run has of its own.
-    fn said(&self, out: &str) -> (BTreeMap<String, Vec<u8>>, String) {
+    fn outputs(&self, out: &str) -> (BTreeMap<String, Vec<u8>>, String) {
         let folder = self.0.path(out).join("readings").read_dir().unwrap();
         let name = |f: &fs::DirEntry| f.file_name().into_string().unwrap();
         let files = folder.map(|f| f.unwrap()).map(|f| (name(&f), fs::read(f.path()).unwrap())).collect();
@@ -75,16 +74,16 @@ fn a_repeated_run_starts_no_engine_and_says_the_same_to_the_byte() {
     assert_eq!(starts, A_RUN);
     lab.run("second", &[]).complains("from the cache");
     assert_eq!(lab.starts(), starts, "the engine was started again");
-    assert!(lab.said("first") == lab.said("second"), "a repeated run says something else");
+    assert!(lab.outputs("first") == lab.outputs("second"), "a repeated run says something else");
     // Without the cache it is started, a seed of its own is a reading of its own, and neither disturbs what is kept.
     lab.run("anew", &["--no-cache"]);
     assert_eq!(lab.starts(), starts + A_RUN);
-    assert_eq!(values(&lab.said("first").0), values(&lab.said("anew").0));
+    assert_eq!(values(&lab.outputs("first").0), values(&lab.outputs("anew").0));
     lab.run("seeded", &["--seed", "2"]);
     assert_eq!(lab.starts(), starts + 2 * A_RUN);
     lab.run("third", &[]);
     assert_eq!(lab.starts(), starts + 2 * A_RUN);
-    assert!(lab.said("first") == lab.said("third"), "other seeds disturb what is kept");
+    assert!(lab.outputs("first") == lab.outputs("third"), "other seeds disturb what is kept");
 }
 
 #[test]
@@ -104,7 +103,7 @@ fn one_meter_more_only_adds_work() {
     assert_eq!((none, added.as_deref()), (None, Some("3 of 4; with a seed of their own plane[0]")));
     assert_eq!(first, more[1..]);
     assert_eq!(run("again", &[]), (more.clone(), added));
-    assert!(lab.said("more") == lab.said("again"), "a repeated run says something else");
+    assert!(lab.outputs("more") == lab.outputs("again"), "a repeated run says something else");
     // What is rendered anew knows nothing of it, and neither does another seed.
     assert_eq!(run("anew", &["--no-cache"]), (more, None));
     assert_eq!(run("seeded", &["--seed", "2"]).1, None);
@@ -129,7 +128,7 @@ fn damaged_entries_are_named_and_read_anew() {
     let messages = lab.run("second", &[]).stderr;
     assert_eq!(lab.starts(), starts + A_RUN);
     assert_eq!(messages.matches("the reading is taken anew").count(), entries.len(), "{messages}");
-    assert_eq!(values(&lab.said("first").0), values(&lab.said("second").0));
+    assert_eq!(values(&lab.outputs("first").0), values(&lab.outputs("second").0));
     assert_eq!(lab.entries().keys().collect::<Vec<_>>(), entries.keys().collect::<Vec<_>>());
 }
 
@@ -169,10 +168,10 @@ fn kills_at_random_instants_lose_and_falsify_nothing() {
         earlier = now;
     }
     assert!(killed >= rounds / 2, "only {killed} runs were still going when they were killed");
-    let right = values(&lab.said("right").0);
+    let right = values(&lab.outputs("right").0);
     for seed in [0, 1, rounds / 4, rounds / 2 - 1] {
         lab.run("final", &["--seed", &seed.to_string()]);
-        let found = values(&lab.said("final").0);
+        let found = values(&lab.outputs("final").0);
         let readings = |all: &BTreeMap<String, Value>| -> Vec<Value> {
             all.values().flat_map(|r| r.as_array().unwrap()).map(|r| r["readings"].clone()).collect()
         };

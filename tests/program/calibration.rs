@@ -28,7 +28,8 @@ const LUX: &str = "lux = illuminance_lx(";
 #[test]
 fn a_right_engine_passes_scenes_of_known_answer_and_says_which_it_declines() {
     let folder = folder(LUX, LUX);
-    run(&folder).exits(0).prints("calibration: asymmetric");
+    run(&folder).exits(0).prints("mine passes 3 scenes");
+    folder.luxproof(&["report", "out", "--all"]).exits(0).prints("calibration: asymmetric");
     let report = folder.report();
     for procedure in PROCEDURES {
         let verdicts = verdicts(&report, procedure);
@@ -75,7 +76,7 @@ fn faults_that_calibration_shows_too_are_named_on_the_terminal() {
         let report = folder.report();
         let lost = among(&report, "comparisons", &[("engine", "mine"), ("verdict", "missing")]);
         assert!(lost.is_empty(), "{name}: {lost:?}");
-        let all = among(&report, "comparisons", &[("engine", "mine"), ("verdict", "inconclusive")]);
+        let all = among(&report, "comparisons", &[("engine", "mine"), ("verdict", "undecided")]);
         assert!(all.is_empty(), "{name}: {all:?}");
     }
 }
@@ -92,7 +93,12 @@ fn what_is_left_out_is_said() {
 #[test]
 fn the_doctor_examines_adapters_too() {
     let folder = folder(LUX, "lux = 1.02 * illuminance_lx(");
-    folder.luxproof(&["engines", "doctor", "mine", "--spec", "spec.yaml"]).exits(1).prints("FAIL 54 +2.0 %");
+    let answer = folder.luxproof(&["engines", "doctor", "mine", "--spec", "spec.yaml"]).exits(1);
+    let scene = answer.stdout.lines().find(|line| line.contains("calibration: asymmetric")).unwrap();
+    assert_eq!(
+        scene.split_whitespace().collect::<Vec<_>>().join(" "),
+        "FAIL mine calibration: asymmetric 54 +2.0 % ±1 %"
+    );
     folder
         .luxproof(&["engines", "doctor", "yours", "--spec", "spec.yaml"])
         .exits(2)
@@ -117,8 +123,8 @@ fn copies_of_an_adapter_do_not_outvote_the_reference() {
         let all = report["consensus"].as_array().unwrap();
         assert!(!all.is_empty());
         for consensus in all {
-            let departs = consensus["departs"].as_array().unwrap();
-            assert!(!departs.iter().any(|d| d == "simulator" || d == "iesna"), "{consensus}");
+            let outliers = consensus["outliers"].as_array().unwrap();
+            assert!(!outliers.iter().any(|d| d == "simulator" || d == "iesna"), "{consensus}");
             let (all, independent) = (consensus["witnesses"].as_array().unwrap().len(), &consensus["independent"]);
             assert!(independent.as_u64().unwrap() as usize <= all - 2, "{consensus}");
         }
@@ -136,7 +142,7 @@ fn a_fault_in_our_own_simulator_is_named_by_the_renderers() {
     let folder = Folder::for_renderers(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
     let asked = ["--engines", "simulator,mitsuba,povray,radiance", "--format", "json"];
     let right = folder.run(&asked).exits(0).json();
-    assert!(right["consensus"][0]["departs"].as_array().unwrap().is_empty(), "{}", right["consensus"]);
+    assert!(right["consensus"][0]["outliers"].as_array().unwrap().is_empty(), "{}", right["consensus"]);
     let kept = std::fs::read_dir(folder.path("cache/simulator")).unwrap().map(|file| file.unwrap().path());
     // Beside answers lie lists of their meters.
     for kept in kept.filter(|path| path.extension().is_some_and(|e| e == "json")) {
@@ -148,7 +154,7 @@ fn a_fault_in_our_own_simulator_is_named_by_the_renderers() {
         }
     }
     let wrong = folder.run(&asked).json();
-    assert_eq!(wrong["consensus"][0]["departs"], serde_json::json!(["simulator"]), "{}", wrong["consensus"]);
+    assert_eq!(wrong["consensus"][0]["outliers"], serde_json::json!(["simulator"]), "{}", wrong["consensus"]);
     assert!(wrong["consensus"][0]["odds"].as_f64().unwrap() > 19.0, "{}", wrong["consensus"]);
 }
 

@@ -34,7 +34,7 @@ fn refused(from: &str, to: &str, place: &str, says: &str) {
 #[track_caller]
 fn refused_files(spec: &str, lamp: &str, place: &str, says: &str) {
     let room = Folder::new(&[("spec.yaml", spec), ("lamp.ies", lamp)]);
-    let error = own_run(&room).exits(2).said();
+    let error = own_run(&room).exits(2).message();
     assert!(error.contains(place), "no place `{place}` in: {error}");
     assert!(error.contains(says), "no `{says}` in: {error}");
     assert!(!room.path("out").exists(), "a run was begun");
@@ -135,7 +135,7 @@ fn what_never_ends_is_not_opened() {
         let made = std::process::Command::new("mkfifo").arg(room.path("pipe")).status();
         assert!(made.is_ok_and(|status| status.success()));
         for spec in ["spec.yaml", "pipe", "/dev/zero"] {
-            let refused = room.luxproof(&["check", spec]).exits(2).said();
+            let refused = room.luxproof(&["check", spec]).exits(2).message();
             assert!(refused.contains("no regular file"), "{refused}");
         }
         for photometry in ["pipe", "/dev/zero"] {

@@ -42,11 +42,11 @@ fn a_change_makes_of_each_engines_light_what_it_makes_of_the_references() {
     // Where flux alone is another, errors cancel, but of what a spot check reads anew.
     for (engine, within) in [("simulator", 1e-9), ("radiance", 1e-3)] {
         let dimmed = of(engine, "spec/dimmed");
-        let one = dimmed["meters"].as_array().unwrap().iter().filter(|m| m["cancels"] == true).count();
+        let one = dimmed["meters"].as_array().unwrap().iter().filter(|m| m["errors_cancel"] == true).count();
         assert!(one >= 10, "{engine}: {dimmed}");
         assert!((number(&dimmed["mean"]["ratio"]["value"]) - 0.5).abs() <= within, "{dimmed}");
     }
-    assert_eq!(radiance["mean"]["cancels"], false);
+    assert_eq!(radiance["mean"]["errors_cancel"], false);
     // Maps of both cases end at the same light.
     let page = folder.luxproof(&["report", "out/report.json", "--format", "html"]).exits(0).stdout;
     let section = page.split("<section id=\"ratios\"").nth(1).unwrap().split("</section>").next().unwrap();
@@ -62,7 +62,7 @@ fn a_change_makes_of_each_engines_light_what_it_makes_of_the_references() {
 }
 
 #[test]
-fn a_pair_of_which_one_is_left_out_is_told() {
+fn a_pair_with_one_engine_left_out_is_reported() {
     let folder = Folder::new(&[("spec.yaml", &format!("{ROOM}{CASES}")), ("lamp.ies", LAMP)]);
     let answer = folder.run(&["--engines", "simulator,iesna", "--filter", "painted"]).exits(0);
     answer.complains("it is not compared with spec/grey, which was not run");

@@ -1,4 +1,4 @@
-//! `luxproof engines doctor --adapter`: adapters that are wrong on purpose, each told what is wrong with it in one run.
+//! `luxproof engines doctor --adapter`: adapters that are wrong on purpose, each with all of its faults reported in one run.
 
 use crate::support::{Answer, Folder, adapter};
 
@@ -26,7 +26,7 @@ const TOPICS: [&str; 8] =
 
 /// Exactly these topics are wrong, each for this reason.
 #[track_caller]
-fn is_told(changes: &[(&str, &str)], wrong: &[(&str, &str)]) {
+fn assert_reported(changes: &[(&str, &str)], wrong: &[(&str, &str)]) {
     let answer = examined(changes);
     assert!(matches!(answer.code, Some(1 | 3)), "{:?}\n{}\n{}", answer.code, answer.stdout, answer.stderr);
     for topic in TOPICS {
@@ -56,11 +56,11 @@ fn a_right_adapter_is_sound_in_all_that_it_says_that_it_can() {
     }
 }
 
-/// Which number stands for which fault is told in `diagnosis::tests`, without a program.
+/// Which number stands for which fault is tested in `diagnosis::tests`, without a program.
 #[test]
 fn wrong_units_are_named() {
-    is_told(&[(LUX, "lux = 4 * math.pi * illuminance_lx(")], &[("units", "factor 4 pi")]);
-    is_told(&[(LUX, "lux = 1.03 * illuminance_lx(")], &[("units", "factor 1.0300, none of those known")]);
+    assert_reported(&[(LUX, "lux = 4 * math.pi * illuminance_lx(")], &[("units", "factor 4 pi")]);
+    assert_reported(&[(LUX, "lux = 1.03 * illuminance_lx(")], &[("units", "factor 1.0300, none of those known")]);
 }
 
 #[test]
@@ -70,13 +70,13 @@ fn tables_luminaires_and_meters_that_point_elsewhere_are_named() {
         ("for axis in lamp[\"axes\"])", "for axis in zip(*lamp[\"axes\"]))", "rotation is applied the wrong way round"),
         ("max(cosine, 0.0)", "abs(cosine)", "light from behind a meter counts, too"),
     ] {
-        is_told(&[(from, to)], &[("orientation", says)]);
+        assert_reported(&[(from, to)], &[("orientation", says)]);
     }
 }
 
 /// What a program that is written anew gets wrong beside the list of known faults.
 #[test]
-fn slips_of_axes_tables_and_luminaires_are_named() {
+fn faults_of_axes_tables_and_luminaires_are_named() {
     let interpolated = "    (g, v), (c, u) = gamma, plane\n";
     let coarse = format!("{interpolated}    u, v = round(u), round(v)\n");
     let rotation = "    x, y, z = (sum(a * r for a, r in zip(axis, ray)) for axis in lamp[\"axes\"])\n";
@@ -101,7 +101,7 @@ fn slips_of_axes_tables_and_luminaires_are_named() {
 }
 
 #[test]
-fn readings_that_are_right_elsewhere_are_told_by_whose_they_are() {
+fn readings_that_are_right_elsewhere_are_reported_with_their_meter() {
     let answers = "    return {\"answers\": [{\"job\": job[\"job\"], **answer(job)} for job in request[\"jobs\"]]}";
     let shifted = "    done = [answer(job) for job in request[\"jobs\"]]
     all = [r[\"illuminance_lx\"] for one in done for r in one.get(\"readings\", [])]
@@ -125,18 +125,18 @@ fn readings_that_are_right_elsewhere_are_told_by_whose_they_are() {
 }
 
 #[test]
-fn missing_meters_and_numbers_that_are_none_are_told() {
+fn missing_meters_and_invalid_numbers_are_reported() {
     let last = "    return {\"readings\": readings,";
     for (from, to, says) in [
         (last, "    return {\"readings\": readings[:-1],", "readings for"),
         (LUX, "lux = float(\"nan\") if meter[\"id\"].endswith(\"[2]\") else illuminance_lx(", "read NaN lx"),
     ] {
-        is_told(&[(from, to)], &[("meters", says)]);
+        assert_reported(&[(from, to)], &[("meters", says)]);
     }
 }
 
 #[test]
-fn noise_that_is_not_as_stated_and_claims_that_do_not_hold_are_told() {
+fn noise_that_is_not_as_stated_and_false_claims_are_reported() {
     let noisy = |stated: f64| {
         format!(
             "        error = 1e-3 * lux\n        lux += error * random.Random(f\"{{job['seed']}} {{meter['id']}}\").gauss(0, 1)\n        \
@@ -146,11 +146,11 @@ fn noise_that_is_not_as_stated_and_claims_that_do_not_hold_are_told() {
     let sampled = "\"std_error_lx\": error, \"degrees_of_freedom\": 60";
     let honest = examined(&[SEEDED, (APPEND, &noisy(1.0)), (BOUND, sampled)]);
     assert!(section(&honest, "noise").starts_with("sound"), "{}", honest.stdout);
-    is_told(&[SEEDED, (APPEND, &noisy(0.2)), (BOUND, sampled)], &[("noise", "times too small")]);
+    assert_reported(&[SEEDED, (APPEND, &noisy(0.2)), (BOUND, sampled)], &[("noise", "times too small")]);
     // At some meters none is stated, and they scatter like the others.
     let some = "\"std_error_lx\": 0 if meter[\"id\"].endswith(\"2]\") else error, \"degrees_of_freedom\": 60";
-    is_told(&[SEEDED, (APPEND, &noisy(1.0)), (BOUND, some)], &[("claims", "an error of zero at")]);
-    is_told(
+    assert_reported(&[SEEDED, (APPEND, &noisy(1.0)), (BOUND, some)], &[("claims", "an error of zero at")]);
+    assert_reported(
         &[SEEDED, (APPEND, &noisy(1.0)), (BOUND, "\"exact\": True")],
         &[("claims", "claims readings without any scatter")],
     );
@@ -158,11 +158,11 @@ fn noise_that_is_not_as_stated_and_claims_that_do_not_hold_are_told() {
 
 /// Within the tolerance nothing fails, and nothing scatters: yet what is claimed does not hold.
 #[test]
-fn bounds_that_known_values_lie_outside_of_are_told() {
+fn bounds_that_exclude_known_values_are_reported() {
     let off = (LUX, "lux = 1.004 * illuminance_lx(");
     for claim in ["\"error_bound_lx\": 1e-3 * lux", "\"exact\": True"] {
         let says = "readings that it calls exact or bounded are off by more than that, by 4.0e-3";
-        is_told(&[off, (BOUND, claim)], &[("claims", says)]);
+        assert_reported(&[off, (BOUND, claim)], &[("claims", says)]);
     }
     assert_eq!(examined(&[off, (BOUND, "\"error_bound_lx\": 5e-3 * lux")]).code, Some(0));
     // What rounding leaves of a right angle is no light.
@@ -170,19 +170,25 @@ fn bounds_that_known_values_lie_outside_of_are_told() {
 }
 
 #[test]
-fn a_broken_protocol_is_told() {
+fn a_broken_protocol_is_reported() {
     let probe = "    if request[\"verb\"] == \"probe\":\n";
-    is_told(&[(probe, &format!("{probe}        return {{\"protocol\": 7}}\n"))], &[("protocol", "there are 1 and 2")]);
-    is_told(&[("[\"batch\"]", "[\"batch\", \"shadow\"]")], &[("protocol", "capabilities that are not known: shadow")]);
+    assert_reported(
+        &[(probe, &format!("{probe}        return {{\"protocol\": 7}}\n"))],
+        &[("protocol", "`protocol: 7` is not supported")],
+    );
+    assert_reported(
+        &[("[\"batch\"]", "[\"batch\", \"shadow\"]")],
+        &[("protocol", "capabilities that are not known: shadow")],
+    );
     let after = ("sys.stdout)", "sys.stdout)\nprint(\"done\")");
-    is_told(&[after], &[("protocol", "it prints `done` after its answer")]);
+    assert_reported(&[after], &[("protocol", "it prints `done` after its answer")]);
     let quoted = ("\"illuminance_lx\": lux,", "\"illuminance_lx\": str(lux),");
-    is_told(&[quoted], &[("protocol", "illuminance_lx`: no number, where one belongs")]);
+    assert_reported(&[quoted], &[("protocol", "illuminance_lx`: no number, where one belongs")]);
     let one = "    assert request[\"verb\"] == \"probe\" or len(request[\"jobs\"]) == 1, \"one job at a time\"\n";
-    is_told(&[(probe, &format!("{one}{probe}"))], &[("protocol", "its capabilities have `batch`, but")]);
+    assert_reported(&[(probe, &format!("{one}{probe}"))], &[("protocol", "its capabilities have `batch`, but")]);
     // One scene alone ends it: that of several luminaires.
     let crash = "def answer(job):\n    assert len(job[\"luminaires\"]) == 1, \"one lamp at a time\"\n";
-    is_told(&[("def answer(job):\n", crash)], &[("protocol", "one lamp at a time")]);
+    assert_reported(&[("def answer(job):\n", crash)], &[("protocol", "one lamp at a time")]);
     let folder = Folder::new(&[]);
     folder
         .luxproof(&["engines", "doctor", "--adapter", "./gone"])

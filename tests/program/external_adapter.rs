@@ -6,9 +6,7 @@ use serde_json::Value;
 
 use sha2::{Digest, Sha256};
 
-use crate::support::{
-    Answer, Folder, MINE, MINE_OF_VERSION_ONE, SKEW_LAMP, SKEW_ROOM, adapter, adapter_of_version_one, among,
-};
+use crate::support::{Answer, Folder, MINE, SKEW_LAMP, SKEW_ROOM, adapter, adapter_with_lines_before_readings, among};
 
 fn folder(adapter: &str) -> Folder {
     let spec = [SKEW_ROOM, "  indirect_illuminance: {meters: plane}\n", MINE].concat();
@@ -55,7 +53,7 @@ fn the_example_adapter_of_sixty_lines_agrees_with_inverse_square() {
 
 #[test]
 fn an_adapter_that_crashes_is_a_failed_engine_and_the_others_go_on() {
-    let folder = folder("import sys\nsys.exit('out of lamps')\n");
+    let folder = folder(&adapter_with_lines_before_readings("sys.exit('out of lamps')\n"));
     let (report, code) = run(&folder);
     assert_eq!(code, Some(3));
     let engine = of_adapter(&report, "engines", "id")[0];
@@ -89,10 +87,10 @@ fn an_engine_without_a_command_is_answered_with_what_to_do() {
 fn the_forms_have_schemas() {
     let folder = folder(&adapter());
     for (name, key) in [
-        ("job", "candela"),
-        ("readings", "illuminance_lx"),
         ("request", "verb"),
+        ("request", "candela"),
         ("probe", "capabilities"),
+        ("answers", "illuminance_lx"),
         ("answers", "blocks_lx"),
     ] {
         let schema = folder.luxproof(&["schema", name]).json();
@@ -121,7 +119,7 @@ fn zero_hits_are_not_seen_and_fail_only_where_samples_are_many() {
     };
     let (unseen, code) = unlucky(2e-1);
     assert_eq!(code, Some(4));
-    assert_eq!((&unseen["verdict"], &unseen["uncertainty"]["kind"]), (&"inconclusive".into(), &"not_seen".into()));
+    assert_eq!((&unseen["verdict"], &unseen["uncertainty"]["kind"]), (&"undecided".into(), &"not_seen".into()));
     assert!(unseen["diagnosis"].as_str().unwrap().starts_with("not seen"), "{unseen}");
     // Where samples are so many, light that comes here would have been met: it is lost.
     let (unseen, code) = unlucky(1e-4);
@@ -168,18 +166,22 @@ const PROBED: &str =
     "{\"protocol\": 2, \"name\": \"inverse square\", \"version\": \"1\", \"capabilities\": [\"batch\"]}";
 const BOUND: &str = "\"error_bound_lx\": 1e-12 * lux";
 
+/// One job per process on standard input, no verbs: what adapters were before the probe.
 #[test]
-fn an_adapter_of_version_one_reads_the_same_whether_it_is_probed_or_not() {
-    let values = |engine: &str| {
-        let spec = [SKEW_ROOM, engine].concat();
-        let files = [("spec.yaml", spec.as_str()), ("lamp.ies", SKEW_LAMP), ("adapter.py", &adapter_of_version_one())];
-        let (report, code) = run(&Folder::new(&files));
-        assert_eq!(code, Some(0), "{}", report["engines"]);
-        let recording = of_adapter(&report, "recordings", "engine")[0];
-        assert!(recording["version"].as_str().unwrap().starts_with("sha256:"), "{recording}");
-        of_adapter(&report, "readings", "engine").iter().map(|r| r["value"].clone()).collect::<Vec<_>>()
-    };
-    assert_eq!(values(MINE), values(MINE_OF_VERSION_ONE));
+fn an_adapter_of_protocol_1_is_absent_and_its_user_learns_what_to_do() {
+    let example = adapter();
+    let (answers, _) = example.split_once("\n\ndef reply(").unwrap();
+    let folder = folder(&format!("{answers}\n\njson.dump(answer(json.load(sys.stdin)), sys.stdout)\n"));
+    let (report, code) = run(&folder);
+    assert_eq!(code, Some(3));
+    let engine = of_adapter(&report, "engines", "id")[0];
+    let reason = engine["reason"].as_str().unwrap();
+    assert_eq!(engine["status"], "absent");
+    for part in ["no valid answer to the request `{\"verb\": \"probe\"}`", "KeyError", "speaks protocol 2 alone"] {
+        assert!(reason.contains(part), "no `{part}` in {reason}");
+    }
+    folder.edit("spec.yaml", "adapter.py]", "adapter.py], protocol: 1");
+    folder.luxproof(&["check", "spec.yaml"]).exits(2).complains("engines.mine.protocol: is not a setting");
 }
 
 #[test]
@@ -242,21 +244,21 @@ def answer(job):
         let adapter = changed(&[(BOUND, stated), ("        readings.append", noise), ("def answer(job):", noisy)]);
         run(&folder(&adapter)).0
     };
-    let told = |stated: &str| {
+    let reported = |stated: &str| {
         let report = report(stated);
         let of =
             |list: &str| among(&report, list, &[("engine", "mine"), ("procedure", "direct_illuminance")])[0].clone();
         (of("readings"), of("recordings"))
     };
-    let (reading, recording) = told(blocks);
+    let (reading, recording) = reported(blocks);
     let relative = reading["std_error"].as_f64().unwrap() / reading["value"].as_f64().unwrap();
     assert!((2e-4..2e-3).contains(&relative), "{reading}");
     assert!((5.0..15.0).contains(&reading["uncertainty"]["degrees_of_freedom"].as_f64().unwrap()), "{reading}");
     assert!(recording["skewness"].is_number(), "{recording}");
-    let (stated, ..) = told(&format!("{blocks}, \"std_error_lx\": 8e-4 * lux, \"degrees_of_freedom\": 900"));
+    let (stated, ..) = reported(&format!("{blocks}, \"std_error_lx\": 8e-4 * lux, \"degrees_of_freedom\": 900"));
     let freedom = stated["uncertainty"]["degrees_of_freedom"].as_f64().unwrap();
     assert!((freedom - 900.0).abs() < 1e-6, "{stated}");
-    let (belied, recording) = told(&format!("{blocks}, \"std_error_lx\": 1e-6 * lux"));
+    let (belied, recording) = reported(&format!("{blocks}, \"std_error_lx\": 1e-6 * lux"));
     assert!(belied["std_error"].as_f64().unwrap() > 1e-4 * belied["value"].as_f64().unwrap(), "{belied}");
     assert!(recording["notes"].to_string().contains("the blocks count there"), "{recording}");
     for (wrong, says) in [
@@ -273,8 +275,8 @@ def answer(job):
 
 #[test]
 fn what_a_probe_says_ties_witnesses_and_is_part_of_what_runs() {
-    let told = "{\"protocol\": 2, \"name\": \"inverse square\", \"version\": \"1\", \"capabilities\": [\"batch\"], \"shares\": [\"a kernel\"], \"depends_on\": [\"table.txt\"]}";
-    let folder = folder(&changed(&[(PROBED, told)]));
+    let reported = "{\"protocol\": 2, \"name\": \"inverse square\", \"version\": \"1\", \"capabilities\": [\"batch\"], \"shares\": [\"a kernel\"], \"depends_on\": [\"table.txt\"]}";
+    let folder = folder(&changed(&[(PROBED, reported)]));
     let mine = || {
         let (report, code) = run(&folder);
         (of_adapter(&report, "engines", "id")[0].clone(), report, code)
@@ -291,17 +293,16 @@ fn what_a_probe_says_ties_witnesses_and_is_part_of_what_runs() {
 }
 
 #[test]
-fn a_probe_that_fails_is_version_one_unless_two_was_stated_and_one_that_is_wrong_is_told() {
-    let stated = MINE.replace("adapter.py]", "adapter.py], protocol: 2");
-    let patient = MINE.replace("adapter.py]", "adapter.py], protocol: 2, start_seconds: 2");
+fn an_adapter_whose_probe_fails_is_absent_with_the_reason() {
+    let patient = MINE.replace("adapter.py]", "adapter.py], start_seconds: 2");
     let verb = "    if request[\"verb\"] == \"probe\":\n";
     for (engine, to, says) in [
-        (stated.as_str(), "        sys.exit('no probes here')\n", "it ends with exit code 1: no probes here"),
-        (&stated, "        return {\"name\": \"mine\"}\n", "it has no `protocol`"),
+        (MINE, "        sys.exit('no probes here')\n", "it ends with exit code 1: no probes here"),
+        (MINE, "        return {\"name\": \"mine\"}\n", "it has no `protocol`"),
         (&patient, "        import time; time.sleep(60)\n", "`start_seconds` gives it more time"),
-        (MINE, "        return {\"protocol\": 3}\n", "`protocol: 3` is not known; there are 1 and 2"),
+        (MINE, "        return {\"protocol\": 3}\n", "`protocol: 3` is not supported"),
         (MINE, "        return {\"protocol\": 2, \"version\": \"1\"}\n", "missing field `name`"),
-        (MINE, "        return {\"protocol\": 2, \"name\": \" \", \"version\": \"1\"}\n", "must say something"),
+        (MINE, "        return {\"protocol\": 2, \"name\": \" \", \"version\": \"1\"}\n", "must not be empty"),
     ] {
         let spec = [SKEW_ROOM, engine].concat();
         let adapter = changed(&[(verb, &format!("{verb}{to}"))]);
@@ -311,9 +312,6 @@ fn a_probe_that_fails_is_version_one_unless_two_was_stated_and_one_that_is_wrong
         assert!(engine["status"] == "absent" && engine["reason"].as_str().unwrap().contains(says), "{to}: {engine}");
         assert_eq!(code, Some(3));
     }
-    let folder = folder(&adapter());
-    folder.edit("spec.yaml", "adapter.py]", "adapter.py], protocol: two");
-    folder.luxproof(&["check", "spec.yaml"]).exits(2).complains("must be 1 or 2");
 }
 
 #[test]
@@ -336,7 +334,7 @@ fn one_job_of_a_batch_that_breaks_takes_no_other_with_it() {
 
 #[test]
 fn a_log_that_is_named_is_there() {
-    let folder = folder("import sys\nsys.exit('out of lamps')\n");
+    let folder = folder(&adapter_with_lines_before_readings("sys.exit('out of lamps')\n"));
     let named = |text: &str| {
         let at = text.find("messages are in ").unwrap_or_else(|| panic!("{text}")) + "messages are in ".len();
         let log = text[at..].split(['"', '\n', ' ', ';']).next().unwrap().trim_end_matches("\\n");

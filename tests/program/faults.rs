@@ -52,7 +52,7 @@ fn pipes_devices_and_huge_files_are_refused_in_place_of_what_is_kept() {
         ];
         for args in commands {
             let answer = folder.luxproof(args).exits(2);
-            let line = answer.said();
+            let line = answer.message();
             assert!(line.contains(says), "{args:?}: no `{says}` in {line}");
         }
     }

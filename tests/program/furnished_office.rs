@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use luxproof::engines::{Site, Support, Workbench};
-use luxproof::plan::{Selection, plan};
-use luxproof::record::{Estimate, ProcedureId};
-use luxproof::spec::{Budget, Case};
+use luxproof_audit::plan::{Selection, plan};
+use luxproof_engines::fixtures::test_root;
+use luxproof_engines::{JobDir, Support};
+use luxproof_model::{Estimate, ProcedureId};
+use luxproof_spec::{Budget, Case};
 
 use crate::support::{Folder, is_night, root};
 
@@ -16,7 +17,7 @@ const INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788]
 
 /// What an engine reads of a procedure of case S2, and what it says beforehand of its own error, relative.
 fn read(engine: &str, procedure: ProcedureId, budget: Budget, settings: &[(&str, u32)]) -> (Vec<Estimate>, f64) {
-    let site = Site::of_user().unwrap();
+    let site = test_root();
     let case = Case { budget, ..Case::load(&root().join("reference/analytic/s2.yaml")).unwrap() };
     let selection = Selection { engines: vec![engine.into()], procedures: vec![procedure], seed: 1 };
     let plan = plan(&case, &selection, &site).unwrap();
@@ -32,16 +33,17 @@ fn read(engine: &str, procedure: ProcedureId, budget: Budget, settings: &[(&str,
     };
     let folder = Folder::for_renderers(&[]);
     let (scene_dir, log) = (folder.path(""), folder.path("log"));
-    let bench = Workbench {
+    let bench = JobDir {
         site,
         scene_dir,
         log,
         jobs: 2,
         patience: Duration::from_secs(300),
         limit: Duration::from_secs(300),
-        peak: luxproof::system::process::PeakMemory::default(),
-        groundwork: luxproof::engines::Groundwork::default(),
+        peak: luxproof_process::process::PeakMemory::default(),
+        shared_precompute: luxproof_engines::SharedPrecompute::default(),
         idle: None,
+        hidden: [].into(),
     };
     (engine.read(&job, &bench).unwrap().estimates, declared)
 }

@@ -10,7 +10,7 @@ room:
   size_m: [6, 4, 3]
   reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.7}
 luminaires:
-  - {id: panel, photometry: panel.ies, at_m: [4, 2, 2.9]}
+  - {id: panel, photometry: panel.ies, at_m: [4, 2, 2.9], model: point}
 meters:
   eyes: {points_m: [[0.5, 2, 1.15], [0.5, 1.3, 1.5]], normal: [3, 0, 0]}
 procedures:
@@ -73,7 +73,7 @@ fn a_rating_is_the_formula_of_the_indirect_light_that_each_engine_reads() {
 
 #[test]
 fn an_eye_that_sees_no_glare_is_refused_and_a_glare_that_is_not_rated_a_warning() {
-    for (from, to, side_m, told) in [
+    for (from, to, side_m, reported) in [
         ("[3, 0, 0]", "[0, 0, 1]", 0.6, "eyes[0] at [0.5, 2, 1.15] looks straight up or down"),
         ("[3, 0, 0]", "[-1, 0, 0]", 0.6, "sees no luminous opening"),
         ("{floor: 0.2, walls: 0.5, ceiling: 0.7}", "{floor: 0, walls: 0, ceiling: 0}", 0.6, "no surface reflects"),
@@ -83,7 +83,7 @@ fn an_eye_that_sees_no_glare_is_refused_and_a_glare_that_is_not_rated_a_warning(
         assert_ne!(spec, SPEC);
         let folder = Folder::new(&[("spec.yaml", &spec), ("panel.ies", &panel(side_m))]);
         let answer = folder.luxproof(&["check", "spec.yaml"]);
-        assert!(answer.said().contains(told) && answer.code == Some(2), "{told}: {}", answer.stderr);
+        assert!(answer.message().contains(reported) && answer.code == Some(2), "{reported}: {}", answer.stderr);
     }
     let folder = Folder::new(&[("spec.yaml", SPEC), ("panel.ies", &panel(0.02))]);
     let answer = folder.luxproof(&["check", "spec.yaml"]);

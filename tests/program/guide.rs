@@ -1,8 +1,9 @@
-//! The guide in docs/: every command in it runs, in the order of the pages, with the engines that it names.
+//! README and the guide in docs/: every command in them runs, in the order of docs/SUMMARY.md, with the engines that it names.
 //!
 //! Blocks marked `console` hold commands behind `$ `; a block marked `yaml NAME` is a file that the commands after it use. All
-//! commands run in one folder that looks like the root of a checkout. Two things differ from what a reader does: `cargo install`
-//! builds what `cargo test` has built already, and `ci/nightly` is told of that program by LUXPROOF.
+//! commands run in one folder that looks like the root of a checkout. Four things differ from what a reader does: `cargo install`
+//! builds what `cargo test` has built already, `ci/nightly` gets that program by LUXPROOF, `panel.ies` of README is a
+//! reference luminaire, and `xdg-open` opens nothing.
 
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
@@ -10,17 +11,13 @@ use std::process::Command;
 
 use crate::support::{Answer, Folder, root};
 
-const PAGES: [&str; 9] = [
-    "first-audit",
-    "writing-a-spec",
-    "reading-a-report",
-    "adding-an-engine",
-    "nightly",
-    "cluster",
-    "methods",
-    "photometry",
-    "bundles",
-];
+/// README and the pages of the guide, in their order.
+fn pages() -> Vec<String> {
+    let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let listed =
+        summary.split("](").skip(1).filter_map(|rest| rest.split(')').next()).map(|page| format!("docs/{page}"));
+    std::iter::once("README.md".to_owned()).chain(listed).collect()
+}
 
 /// A step of the guide.
 #[derive(Debug, PartialEq)]
@@ -70,23 +67,45 @@ fn checkout() -> Folder {
     symlink(env!("CARGO_BIN_EXE_luxproof"), bin.join("luxproof")).unwrap();
     // Compiled it is already.
     let cargo = format!(
-        "#!/bin/sh\n[ \"$*\" = 'install --locked --path harness' ] || exit 2\nexec {} metadata --locked --no-deps --format-version 1 --manifest-path {}/harness/Cargo.toml > /dev/null\n",
+        "#!/bin/sh\n[ \"$*\" = 'install --locked --path harness/luxproof' ] || exit 2\nexec {} metadata --locked --no-deps --format-version 1 --manifest-path {}/harness/luxproof/Cargo.toml > /dev/null\n",
         env!("CARGO"),
         root().display()
     );
-    fs::write(bin.join("cargo"), cargo).unwrap();
-    fs::set_permissions(bin.join("cargo"), fs::Permissions::from_mode(0o755)).unwrap();
+    // No test opens a browser.
+    for (name, script) in [("cargo", cargo.as_str()), ("xdg-open", "#!/bin/sh\n")] {
+        fs::write(bin.join(name), script).unwrap();
+        fs::set_permissions(bin.join(name), fs::Permissions::from_mode(0o755)).unwrap();
+    }
     folder
+}
+
+/// Every line of the report that README shows is printed, apart from its numbers and widths.
+fn prints_what_the_readme_shows(readme: &str, stdout: &str) {
+    let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let printed: Vec<String> = stdout.lines().map(without_numbers).collect();
+    // The title also names the commit and whether sources differ from it.
+    let missing: Vec<&str> = shown.lines().skip(1).filter(|line| !printed.contains(&without_numbers(line))).collect();
+    assert!(
+        shown.lines().count() >= 10 && missing.is_empty(),
+        "README shows what no run prints: {missing:#?}\n{stdout}"
+    );
+}
+
+/// The words of a line that have no digit.
+fn without_numbers(line: &str) -> String {
+    let words = line.split_whitespace().filter(|word| !word.contains(|c: char| c.is_ascii_digit()));
+    words.collect::<Vec<_>>().join(" ")
 }
 
 #[test]
 fn every_command_of_the_guide_runs() {
     let folder = checkout();
     fs::create_dir(folder.path("luxproof-out")).unwrap();
+    fs::copy(root().join("reference/luminaires/lambertian-06m.ies"), folder.path("panel.ies")).unwrap();
     let path = format!("{}:{}", folder.path("bin").display(), std::env::var("PATH").unwrap());
     let mut count = 0;
-    for name in PAGES {
-        let page = fs::read_to_string(root().join(format!("docs/{name}.md"))).unwrap();
+    for name in pages() {
+        let page = fs::read_to_string(root().join(&name)).unwrap();
         for step in steps(&page) {
             match step {
                 Step::Write(file, text) => folder.write(&file, &text),
@@ -95,7 +114,10 @@ fn every_command_of_the_guide_runs() {
                     shell.args(["-c", &command]).current_dir(folder.path("")).env("PATH", &path);
                     shell.env("LUXPROOF", env!("CARGO_BIN_EXE_luxproof")).env("LUXPROOF_CACHE", folder.path("cache"));
                     let Answer { code, stdout, stderr } = Answer::of(&mut shell);
-                    assert_eq!(code, Some(0), "docs/{name}.md: `{command}`\n{stdout}\n{stderr}");
+                    assert_eq!(code, Some(0), "{name}: `{command}`\n{stdout}\n{stderr}");
+                    if name == "README.md" && command.starts_with("luxproof run ") {
+                        prints_what_the_readme_shows(&page, &stdout);
+                    }
                     for line in shown {
                         let is_it = |printed: &str| {
                             let (head, tail) = line.split_once("...").unwrap_or((&line, ""));
@@ -103,7 +125,7 @@ fn every_command_of_the_guide_runs() {
                                 && printed.ends_with(tail)
                                 && (line.contains("...") || printed == line)
                         };
-                        assert!(stdout.lines().any(is_it), "docs/{name}.md: `{command}` prints no `{line}`\n{stdout}");
+                        assert!(stdout.lines().any(is_it), "{name}: `{command}` prints no `{line}`\n{stdout}");
                     }
                     count += 1;
                 }
@@ -112,7 +134,14 @@ fn every_command_of_the_guide_runs() {
     }
     assert!(count >= 20, "only {count} commands were found");
     // What the pages say is there, is there.
-    for file in ["cie-5.2/report.html", "cie-5.3/junit.xml", "spec.schema.json", "try/site/index.html"] {
+    for file in [
+        "cie-5.2/report.html",
+        "cie-5.3/junit.xml",
+        "spec.schema.json",
+        "mine-site/index.html",
+        "shared.zip",
+        "try/site/index.html",
+    ] {
         let length = fs::metadata(folder.path("luxproof-out").join(file)).map(|m| m.len());
         assert!(length.is_ok_and(|l| l > 100), "{file}");
     }
@@ -123,15 +152,16 @@ fn every_command_of_the_guide_runs() {
 #[test]
 fn links_between_the_pages_lead_somewhere() {
     let mut count = 0;
-    for name in PAGES.into_iter().chain(["README"]) {
-        let page = fs::read_to_string(root().join(format!("docs/{name}.md"))).unwrap();
+    for name in pages() {
+        let page = fs::read_to_string(root().join(&name)).unwrap();
+        let folder = root().join(&name).parent().unwrap().to_owned();
         for target in page.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
             let file = target.split('#').next().unwrap();
             if !file.is_empty() && !file.contains("://") {
-                assert!(root().join("docs").join(file).exists(), "docs/{name}.md: {target}");
+                assert!(folder.join(file).exists(), "{name}: {target}");
                 count += 1;
             }
         }
     }
-    assert!(count >= 10, "only {count} links were found");
+    assert!(count >= 100, "only {count} links were found");
 }

@@ -139,7 +139,7 @@ fn a_room_in_three_formats_is_one_spec() {
     ] {
         assert!(spec.contains(part), "{spec}");
     }
-    // It is a spec as it is, and nothing in it is hardly meant.
+    // It is a spec as it is, and it has no lints.
     let checked = folder.luxproof(&["check", "room/spec.yaml"]).exits(0);
     assert!(checked.stderr.is_empty(), "{}", checked.stderr);
     folder.luxproof(&["import", "room.rad"]).exits(2).complains("is there already");
@@ -187,9 +187,9 @@ fn a_room_in_three_formats_is_one_spec() {
         }
         std::fs::remove_dir_all(folder.path("other")).unwrap();
     }
-    let told = folder.luxproof(&["import", "room.rad", "--out", "json", "--format", "json"]).exits(0).json();
-    assert_eq!((&told["triangles"], &told["room"]["kind"]), (&28.into(), &"box".into()), "{told}");
-    assert_eq!(told["materials"][4]["area_m2"].as_f64().map(|area| (area * 1e6).round()), Some(1.44e6));
+    let reported = folder.luxproof(&["import", "room.rad", "--out", "json", "--format", "json"]).exits(0).json();
+    assert_eq!((&reported["triangles"], &reported["room"]["kind"]), (&28.into(), &"box".into()), "{reported}");
+    assert_eq!(reported["materials"][4]["area_m2"].as_f64().map(|area| (area * 1e6).round()), Some(1.44e6));
 }
 
 #[test]
@@ -272,13 +272,13 @@ fn an_imported_room_reads_what_the_same_room_reads_by_hand() {
     with_speck.push((0, [[0.0, 10.0, 0.0], [0.1, 10.0, 0.0], [0.0, 10.1, 0.0]].to_vec()));
     folder.write("open.rad", &radiance(&with_speck));
     for (name, kind) in [("boxed", "box"), ("open", "black")] {
-        let told = folder.luxproof(&["import", &format!("{name}.rad"), "--format", "json"]).exits(0).json();
-        assert_eq!(told["room"]["kind"], kind, "{told}");
+        let reported = folder.luxproof(&["import", &format!("{name}.rad"), "--format", "json"]).exits(0).json();
+        assert_eq!(reported["room"]["kind"], kind, "{reported}");
         let spec = folder.read(&format!("{name}/spec.yaml"));
         let (geometry, _) = spec.split_once("luminaires:").unwrap();
         // Where the room's corner lies in the spec.
-        let low: Vec<f64> = told["min_m"].as_array().unwrap().iter().map(|c| c.as_f64().unwrap()).collect();
-        let margin = told["room"]["margin_m"].as_f64().unwrap();
+        let low: Vec<f64> = reported["min_m"].as_array().unwrap().iter().map(|c| c.as_f64().unwrap()).collect();
+        let margin = reported["room"]["margin_m"].as_f64().unwrap();
         let at = [0, 1, 2].map(|k| off[k] - low[k] + margin);
         let imported = readings(&folder, &format!("{name}/spec.yaml"), geometry, at);
         assert_eq!((hand.len(), imported.len()), (8, 8));

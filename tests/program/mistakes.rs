@@ -1,4 +1,4 @@
-//! Mistakes of users, and what they are told: every fault of all files at once, each at its place; what is hardly meant is a warning.
+//! Mistakes of users and their messages: every fault of all files at once, each at its place; suspicious input is a warning.
 
 use std::fmt::Write;
 
@@ -141,7 +141,7 @@ fn folder() -> Folder {
 }
 
 /// What is said of a mistake: exit code and standard error.
-fn said(mistake: &Mistake) -> Answer {
+fn provoke(mistake: &Mistake) -> Answer {
     let folder = folder();
     let check = &["check", "spec.yaml"][..];
     let args = match mistake {
@@ -163,10 +163,10 @@ fn said(mistake: &Mistake) -> Answer {
 }
 
 #[test]
-fn mistakes_of_users_are_told_with_place_and_remedy() {
+fn mistakes_of_users_are_reported_with_place_and_remedy() {
     let mut all = String::new();
     for (name, mistake) in MISTAKES {
-        let answer = said(mistake);
+        let answer = provoke(mistake);
         assert_eq!(answer.code, Some(2), "{name}: {}{}", answer.stdout, answer.stderr);
         writeln!(all, "## {name}\n{}\n", answer.stderr.trim_end()).unwrap();
     }
@@ -174,10 +174,10 @@ fn mistakes_of_users_are_told_with_place_and_remedy() {
     insta::assert_snapshot!(all);
 }
 
-/// Where faults are told to be, in order.
+/// The places of faults, in order.
 fn places(answer: &Answer) -> Vec<&str> {
-    let told = answer.stderr.lines().filter_map(|line| line.trim_start().strip_prefix("× "));
-    told.filter_map(|line| line.split_once(": ").map(|(place, _)| place)).collect()
+    let reported = answer.stderr.lines().filter_map(|line| line.trim_start().strip_prefix("× "));
+    reported.filter_map(|line| line.split_once(": ").map(|(place, _)| place)).collect()
 }
 
 #[test]
@@ -210,7 +210,7 @@ budget: {seconds: 0}
 }
 
 #[test]
-fn every_bad_spec_of_a_folder_is_told_and_so_are_policy_and_options() {
+fn every_bad_spec_of_a_folder_is_reported_and_so_are_policy_and_options() {
     let folder = folder();
     folder.write("other.yaml", &spec().replace("size_m", "sise_m"));
     folder.edit("spec.yaml", "walls: 0.5", "walls: 2");
@@ -223,18 +223,18 @@ fn every_bad_spec_of_a_folder_is_told_and_so_are_policy_and_options() {
 }
 
 #[test]
-fn of_many_things_that_are_hardly_meant_some_are_told_and_the_rest_are_counted() {
+fn of_many_lints_some_are_shown_and_the_rest_are_counted() {
     let lamp = |k: usize| format!("  - {{id: l{k}, photometry: lamp.ies, at_m: [3, 2, 2.{k:02}5]}}\n");
     let lamps = (0..25).map(lamp).collect::<Vec<_>>().concat();
     let around = "obstacles:\n  - box: {min_m: [2, 1, 1.9], max_m: [4, 3, 2.9], reflectance: 0.5}\n";
     let folder = folder();
     folder.edit("spec.yaml", "luminaires:\n", &format!("{around}luminaires:\n{lamps}"));
-    let told = folder.luxproof(&["check", "spec.yaml"]).complains("6 more things are hardly meant").stderr;
-    assert_eq!(told.matches("no light").count(), 20, "{told}");
+    let reported = folder.luxproof(&["check", "spec.yaml"]).complains("6 more lints").stderr;
+    assert_eq!(reported.matches("no light").count(), 20, "{reported}");
 }
 
 #[test]
-fn what_is_hardly_meant_is_a_warning_at_its_place_and_no_error() {
+fn suspicious_input_is_a_warning_at_its_place_and_no_error() {
     let box_around = "obstacles:\n  - box: {min_m: [2, 1, 2], max_m: [4, 3, 2.9], reflectance: 0.5}\n";
     for (mistake, place, says) in [
         (In("[6, 4, 3]", "[6000, 4000, 3000]"), "4:11", "millimetres"),
@@ -250,11 +250,15 @@ fn what_is_hardly_meant_is_a_warning_at_its_place_and_no_error() {
         (In("normal: [0, 0, 1]", "normal: [0, 0, -1]"), "12:23", "every reading is 0"),
         (In("at_m: [3, 2, 2.5]", "at_m: [3, 2, 2.5], flux_scale: 0"), "12:23", "every reading is 0"),
     ] {
-        let answer = said(&mistake);
+        let answer = provoke(&mistake);
         assert_ne!(answer.code, Some(2), "{}", answer.stderr);
-        let told = answer.said();
-        assert!(told.contains(&format!("spec.yaml:{place}")) || place.is_empty(), "{place} {says}: {}", answer.stderr);
-        assert!(told.contains(says) && (place.is_empty() == told.is_empty()), "{says}: {}", answer.stderr);
+        let reported = answer.message();
+        assert!(
+            reported.contains(&format!("spec.yaml:{place}")) || place.is_empty(),
+            "{place} {says}: {}",
+            answer.stderr
+        );
+        assert!(reported.contains(says) && (place.is_empty() == reported.is_empty()), "{says}: {}", answer.stderr);
     }
     let in_feet = In("[[1, 1, 0.8], [3, 2, 0.8]]", "[[1, 1, 2.5], [3, 2, 2.5]]");
     let folder = folder();
@@ -263,10 +267,10 @@ fn what_is_hardly_meant_is_a_warning_at_its_place_and_no_error() {
     folder.edit("spec.yaml", "[6, 4, 3]", "[20, 13, 9]");
     folder.edit("spec.yaml", "at_m: [3, 2, 2.5]", "at_m: [3, 2, 8.5]");
     folder.luxproof(&["check", "spec.yaml"]).complains("are these feet?");
-    // What many cases have is told once.
+    // What many cases have is reported once.
     folder.edit("spec.yaml", "procedures:", "cases: [{name: a}, {name: b}, {name: c}]\nprocedures:");
-    let told = folder.luxproof(&["check", "spec.yaml"]).complains("(in spec/a and 2 more)").stderr;
-    assert_eq!(told.matches("are these feet?").count(), 1, "{told}");
+    let reported = folder.luxproof(&["check", "spec.yaml"]).complains("(in spec/a and 2 more)").stderr;
+    assert_eq!(reported.matches("are these feet?").count(), 1, "{reported}");
     // The same where it is run.
     let out = ["run", "spec.yaml", "--engines", "simulator,iesna", "--no-calibration"];
     std::fs::remove_file(folder.path("luxproof.yaml")).unwrap();

@@ -1,16 +1,18 @@
 //! Negative controls: a deliberately wrong export, run on the real renderer, must fail its procedure.
 
+use luxproof_spec::Trust;
 use std::sync::Arc;
 
-use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
-use luxproof::audit::Silent;
-use luxproof::audit::jobs::Running;
-use luxproof::engines::Site;
-use luxproof::judge::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
-use luxproof::measure::{Machine, Reader};
-use luxproof::plan::{Selection, plan};
-use luxproof::record::{ProcedureId, Recording};
-use luxproof::spec::Case;
+use luxproof_audit::SilentObserver;
+use luxproof_audit::jobs::Running;
+use luxproof_audit::measure::{Machine, Reader};
+use luxproof_audit::plan::{Selection, plan};
+use luxproof_engines::fixtures::test_root;
+use luxproof_model::{Comparison, Verdict};
+use luxproof_model::{ProcedureId, Recording};
+use luxproof_photometry::{LuminousIntensityDistribution, Photometry};
+use luxproof_spec::Case;
+use luxproof_verdict::{Judge, KnownDeviations, Tolerances};
 
 use crate::support::{Folder, root};
 
@@ -24,12 +26,12 @@ fn selection(engine: &str) -> Selection {
 }
 
 fn recordings(case: &Case, engine: &str) -> Vec<Recording> {
-    let site = Site::of_user().unwrap();
+    let site = test_root();
     let out = Folder::for_renderers(&[]);
     let plan = plan(case, &selection(engine), &site).unwrap();
     let folder = out.path("");
     let reader = Reader { out: Some(folder.clone()), ..Reader::bare(&site, Machine::new(2)) };
-    let running = Running { case, plan: &plan, folder: Some(&folder), reader, observer: &Silent };
+    let running = Running { case, plan: &plan, folder: Some(&folder), reader, observer: &SilentObserver };
     let outcome = running.run().unwrap();
     let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.key.engine == engine).collect();
     assert!(!mine.is_empty(), "{engine} did not run; run `luxproof engines install`");
@@ -50,11 +52,12 @@ fn tampered(case: &Case, wrong: impl Fn(&LuminousIntensityDistribution) -> Lumin
 fn judged(truth: &Case, exported: &Case, engine: &str) -> Vec<Comparison> {
     let tolerances = Tolerances::built_in().unwrap();
     let known = KnownDeviations::built_in().unwrap();
-    let judge = Judge { tolerances: &tolerances, known: &known, overrides: &truth.tolerances, published: None };
+    let (overrides, trust) = (&truth.tolerances, Trust::Own);
+    let judge = Judge { tolerances: &tolerances, known: &known, overrides, trust, published: None };
     let witness = recordings(truth, "iesna");
     let subject = recordings(exported, engine);
-    let plan = plan(truth, &selection(engine), &Site::of_user().unwrap()).unwrap();
-    let of_task = |task: &luxproof::procedures::Task| {
+    let plan = plan(truth, &selection(engine), &test_root()).unwrap();
+    let of_task = |task: &luxproof_spec::procedures::Task| {
         let both: Vec<&Recording> =
             witness.iter().chain(&subject).filter(|r| r.key.procedure == task.procedure).collect();
         judge.compare(task, &both)

@@ -44,7 +44,7 @@ fn a_ball_is_as_bright_from_near_and_far() {
 
 #[test]
 fn an_eye_to_which_no_opening_shows_is_refused() {
-    for (from, to, opening, told) in [
+    for (from, to, opening, reported) in [
         ("luminaire: ball,", "luminaire: bal,", "-0.2 -0.2 -0.2", "there is no luminaire `bal`"),
         ("meters: eyes", "meters: eye", "-0.2 -0.2 -0.2", "there is no meter set `eye`"),
         ("[2.15, 2, 1.5]", "[2.05, 2, 1.5]", "-0.2 -0.2 -0.2", "eyes[0] at [2.05, 2, 1.5] sees no luminous area"),
@@ -66,6 +66,6 @@ fn an_eye_to_which_no_opening_shows_is_refused() {
         assert_ne!(spec, SPEC);
         let folder = Folder::new(&[("spec.yaml", &spec), ("ball.ies", &even(opening))]);
         let answer = folder.luxproof(&["check", "spec.yaml"]);
-        assert!(answer.said().contains(told) && answer.code == Some(2), "{told}: {}", answer.stderr);
+        assert!(answer.message().contains(reported) && answer.code == Some(2), "{reported}: {}", answer.stderr);
     }
 }

@@ -92,7 +92,7 @@ fn what_follows_is_not_rendered_and_reads_and_is_judged_the_same() {
         let found = found.unwrap_or_else(|| panic!("{case}: no `{what}` in {skips:?}"));
         assert!(found["saved"].as_str().unwrap().contains('%'), "{found}");
     };
-    says("spec/whole", "radiance", "18 of 24 meters mirror others");
+    says("spec/whole", "radiance", "only 6 of 24 points are rendered");
     says("spec/dimmed", "simulator", "rescaled by 0.5");
     says("spec/above", "radiance", "no luminaire sends light straight to 24 of 24 meters");
     let skips = whole["skips"].as_array().unwrap();
@@ -104,8 +104,14 @@ fn what_follows_is_not_rendered_and_reads_and_is_judged_the_same() {
     }
     let mirrored = &among(&planned, "recordings", &[("engine", "radiance")])[0]["effort"]["mirrored_meters"];
     assert!(mirrored.as_str().unwrap().contains("plane[23] is plane[0] (x -> -x, y -> -y)"), "{mirrored}");
+    // What follows does not count as rendered; a spot check does.
+    for format in ["markdown", "html"] {
+        let report = folder.luxproof(&["report", "out", "--format", format]).stdout;
+        assert!(report.contains("rendered, ") && report.contains(" by symmetry"), "{format}: {report}");
+    }
+    folder.luxproof(&["report", "out"]).prints("points: rendered + by symmetry");
     let check = folder.luxproof(&["check", "spec.yaml", "--engines", "radiance"]);
-    check.prints("18 of 24 meters mirror others");
+    check.prints("only 6 of 24 points are rendered");
 }
 
 #[test]

@@ -101,6 +101,6 @@ fn a_reference_case_under_another_name_has_the_same_verdicts() {
         all.iter().map(|c| c["verdict"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
     };
     let original = of(at.join("specs/cachet.yaml").to_str().unwrap(), "one");
-    assert!(original.iter().filter(|v| *v == "known_deviation").count() >= 12, "{original:?}");
+    assert!(original.iter().filter(|v| *v == "known_deviation").count() >= 10, "{original:?}");
     assert_eq!(of("copy.yaml", "two"), original);
 }

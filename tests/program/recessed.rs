@@ -71,7 +71,7 @@ fn a_point_in_the_ceiling_is_read_as_the_simulator_says_by_every_renderer() {
 #[test]
 fn a_ceiling_that_reflects_under_its_panels_would_be_noticed() {
     let mean = |folder: Folder| {
-        let report = folder.run(&["--engines", OWN, "--format", "json"]).json();
+        let report = folder.run(&["--engines", OWN, "--sampling", "accurate", "--format", "json"]).json();
         let found = among(&report, "readings", &[("procedure", "indirect_illuminance"), ("engine", "simulator")]);
         found.iter().map(|r| r["value"].as_f64().unwrap()).sum::<f64>()
     };
@@ -82,7 +82,8 @@ fn a_ceiling_that_reflects_under_its_panels_would_be_noticed() {
     hung.edit("spec.yaml", "at_m: [1.5, 3, 3]", "at_m: [1.5, 3, 2.99]");
     hung.edit("spec.yaml", "at_m: [4.5, 3, 3]", "at_m: [4.5, 3, 2.99]");
     let (recessed, hung) = (mean(office_with(&panel())), mean(hung));
-    assert!(hung / recessed - 1.0 > 0.03, "{recessed} {hung}");
+    // It is 3.2 %, and 2 % are allowed.
+    assert!(hung / recessed - 1.0 > 0.02, "{recessed} {hung}");
 }
 
 #[test]
@@ -98,7 +99,7 @@ fn what_cannot_be_mounted_is_refused_with_its_place_and_a_remedy() {
     ] {
         let folder = office_with(panel);
         folder.edit("spec.yaml", "at_m: [1.5, 1, 3]", to);
-        let said = folder.luxproof(&["check", "spec.yaml"]).exits(2).said();
+        let said = folder.luxproof(&["check", "spec.yaml"]).exits(2).message();
         assert!(said.contains("spec.yaml:6:") && said.contains(says), "no `{says}` in {said}");
     }
     let overlapping = office_with(&flat);

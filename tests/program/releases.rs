@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::support::{
-    Answer, Folder, LAMP, ROOM, SKEW_LAMP, SKEW_ROOM, TWO_METERS, adapter_of_version_one, among, is_night,
+    Answer, Folder, LAMP, ROOM, SKEW_LAMP, SKEW_ROOM, TWO_METERS, adapter_with_lines_before_readings, among, is_night,
 };
 
 const DIRECT: &str = "procedures:\n  direct_illuminance: {meters: plane}\n";
@@ -11,12 +11,11 @@ const DIRECT: &str = "procedures:\n  direct_illuminance: {meters: plane}\n";
 /// An adapter that scales its readings by its second word where its first is this release or a later one, and crashes at those that are
 /// named behind.
 fn planted() -> String {
-    let head = "import json, sys\nrelease = int(sys.argv[1])\nif str(release) in sys.argv[2:]:\n    sys.exit('out of lamps')\n";
-    let scaled = "answered = answer(json.load(sys.stdin))\nfor reading in answered['readings']:\n    \
-                  reading['illuminance_lx'] *= factor(release)\njson.dump(answered, sys.stdout)\n";
-    let example = adapter_of_version_one();
-    let (answers, _) = example.rsplit_once("\n\njson.dump(").unwrap();
-    format!("{head}{answers}\n\n\nfrom factor import factor\n{scaled}")
+    let crash = "if sys.argv[1] in sys.argv[2:]:\n    sys.exit('out of lamps')\n";
+    let adapter = adapter_with_lines_before_readings(crash);
+    let (exact, scaled) = ("\"illuminance_lx\": lux", "\"illuminance_lx\": lux * factor(int(sys.argv[1]))");
+    assert!(adapter.contains(exact));
+    adapter.replace(exact, scaled).replace("import json\n", "import json\nfrom factor import factor\n")
 }
 
 /// Sixteen releases, 1.1 to 1.16, whose readings are off by what `factor` says in Python; `crashing` give none.
@@ -24,7 +23,7 @@ fn sixteen(factor: &str, crashing: &str) -> Folder {
     let release = |k| format!("\"1.{k}\": python3 -S adapter.py {k} {crashing}");
     let releases: Vec<String> = (1..=16).map(release).collect();
     let engines = format!(
-        "engines:\n  mine:\n    command: [python3, -S, adapter.py, \"1\"]\n    protocol: 1\n    releases: {{{}}}\n",
+        "engines:\n  mine:\n    command: [python3, -S, adapter.py, \"1\"]\n    releases: {{{}}}\n",
         releases.join(", ")
     );
     Folder::new(&[
@@ -48,13 +47,13 @@ fn found(answer: &Answer) -> Value {
 fn a_planted_regression_among_sixteen_releases_is_found_in_four_runs_besides_the_ends() {
     let folder = sixteen("1.05 if release >= 11 else 1", "");
     let answer = bisect(&folder, "1.1", "1.16", &["--format", "json"]).exits(0);
-    let told = found(&answer);
-    assert_eq!((&told["good"], &told["bad"]), (&"1.10".into(), &"1.11".into()), "{told}");
-    assert!(told["runs"].as_u64().unwrap() <= 6, "{told}");
+    let reported = found(&answer);
+    assert_eq!((&reported["good"], &reported["bad"]), (&"1.10".into(), &"1.11".into()), "{reported}");
+    assert!(reported["runs"].as_u64().unwrap() <= 6, "{reported}");
     let changed: Vec<&str> =
-        told["changed"].as_array().unwrap().iter().map(|c| c["procedure"].as_str().unwrap()).collect();
+        reported["changed"].as_array().unwrap().iter().map(|c| c["procedure"].as_str().unwrap()).collect();
     assert_eq!(changed, ["luminous_intensity", "direct_illuminance"]);
-    assert_eq!(answer.stderr.lines().filter(|line| line.starts_with("mine@1.")).count() as u64, told["runs"]);
+    assert_eq!(answer.stderr.lines().filter(|line| line.starts_with("mine@1.")).count() as u64, reported["runs"]);
     // What mended it, the other way round, out of the cache as far as it was read.
     bisect(&folder, "1.16", "1.1", &[]).exits(2).complains("the other way round");
     let mended = sixteen("1 if release >= 11 else 1.05", "");
@@ -112,7 +111,7 @@ fn a_release_of_a_program_is_an_engine_of_its_own_on_the_command_line_and_in_the
     folder.luxproof(&["accept", "out", "--all", "--reason", "planted"]).exits(0);
     let hold = |folder: &Folder| folder.run(&["--procedures", "direct_illuminance", "--baseline", "baselines"]);
     hold(&folder).exits(0);
-    // It moves by itself, and is told by its name.
+    // It moves by itself, and is reported by its name.
     folder.edit("factor.py", "1.05 if release >= 11", "1.04 if release >= 11");
     hold(&folder).exits(1).prints("mine@1.16");
 }
@@ -130,8 +129,8 @@ fn names_of_releases_that_lead_anywhere_are_refused_where_they_stand_and_nothing
         let room = Folder::new(&[("spec.yaml", &[ROOM, TWO_METERS, DIRECT, &engines].concat()), ("lamp.ies", LAMP)]);
         for more in [&[][..], &["--untrusted"]] {
             let answer = room.luxproof(&[&["check", "spec.yaml"][..], more].concat()).exits(2);
-            let told = answer.said();
-            assert!(told.contains(says) && told.contains("spec.yaml:13"), "{told}");
+            let reported = answer.message();
+            assert!(reported.contains(says) && reported.contains("spec.yaml:13"), "{reported}");
         }
         assert!(!room.path("engines/releases").exists());
     }

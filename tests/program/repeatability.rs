@@ -22,7 +22,7 @@ budget: {relative_error: 0.02, seconds: 60}
 ";
 
 /// The report of a run without the times that it has of its own.
-fn said(folder: &Folder, seed: &str, more: &[&str]) -> Value {
+fn report_of(folder: &Folder, seed: &str, more: &[&str]) -> Value {
     let engines = ["--engines", "radiance,mitsuba,povray,simulator"];
     let fixed = ["run", "spec.yaml", "--no-cache", "--no-calibration", "--seed", seed, "--out", "out"];
     folder.luxproof(&[&fixed[..], &engines, more].concat()).exits(0);
@@ -62,7 +62,7 @@ fn under_load<T>(run: impl FnOnce() -> T) -> T {
 #[test]
 fn one_seed_says_the_same_to_the_byte_on_a_busy_machine_and_with_other_numbers_of_processes() {
     let folder = Folder::for_renderers(&[("spec.yaml", SPEC), ("lamp.ies", SKEW_LAMP)]);
-    let idle = said(&folder, "2", &[]);
+    let idle = report_of(&folder, "2", &[]);
     for engine in ["radiance", "mitsuba", "povray"] {
         let sampled = idle["recordings"]
             .as_array()
@@ -71,14 +71,14 @@ fn one_seed_says_the_same_to_the_byte_on_a_busy_machine_and_with_other_numbers_o
             .any(|r| r["engine"] == engine && r["work_s"].as_f64() > Some(0.0));
         assert!(sampled, "{engine} sampled nothing: {idle}");
     }
-    let busy = under_load(|| said(&folder, "2", &[]));
+    let busy = under_load(|| report_of(&folder, "2", &[]));
     assert_eq!(idle, busy, "a busy machine reads otherwise");
     // Commands name how many threads they run on.
     assert_eq!(
         idle["readings"],
-        said(&folder, "2", &["--jobs", "1"])["readings"],
+        report_of(&folder, "2", &["--jobs", "1"])["readings"],
         "one process at a time reads otherwise"
     );
-    let other = said(&folder, "3", &[]);
+    let other = report_of(&folder, "3", &[]);
     assert_ne!(idle["readings"], other["readings"], "another seed reads the same");
 }

@@ -24,10 +24,10 @@ fn finding(report: &Value) -> &str {
 }
 
 #[test]
-fn a_program_is_told_what_its_standard_errors_are_worth() {
-    for (stated, code, told) in [(1.0, 0, "honest"), (0.5, 1, "too_small"), (2.0, 1, "too_large")] {
+fn a_program_learns_what_its_standard_errors_are_worth() {
+    for (stated, code, reported) in [(1.0, 0, "honest"), (0.5, 1, "too_small"), (2.0, 1, "too_large")] {
         let report = honesty(stated).exits(code).json();
-        assert_eq!(finding(&report), told, "{stated}: {report}");
+        assert_eq!(finding(&report), reported, "{stated}: {report}");
     }
 }
 

@@ -120,7 +120,7 @@ fn a_hall_of_two_hundred_luminaires_is_a_few_lines() {
 }
 
 #[test]
-fn what_is_no_room_no_row_and_no_grid_is_told_with_its_place() {
+fn invalid_rooms_rows_and_grids_are_reported_with_their_place() {
     let spec = |room: &str, array: &str, desk: &str| {
         format!(
             "luxproof: 1\nroom: {{{room}, reflectance: {{floor: 0.2, walls: 0.5, ceiling: 0.7}}}}\n\
@@ -132,7 +132,7 @@ fn what_is_no_room_no_row_and_no_grid_is_told_with_its_place() {
         "at_m: [1, 1, 2]",
         "points_m: [[1, 1, 1]], normal: [0, 0, 1]",
     );
-    for (spec, told) in [
+    for (spec, reported) in [
         (spec("floor_m: [[0, 0], [6, 0], [3, 0]], height_m: 3", array, desk), "it holds nothing"),
         (
             spec("floor_m: [[0, 0], [6, 6], [6, 0], [0, 6]], height_m: 3", array, desk),
@@ -162,8 +162,8 @@ fn what_is_no_room_no_row_and_no_grid_is_told_with_its_place() {
     ] {
         let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
         let done = folder.luxproof(&["check", "spec.yaml"]);
-        let said = done.said();
-        assert!(done.code == Some(2) && said.contains(told), "{told}: {said}");
+        let said = done.message();
+        assert!(done.code == Some(2) && said.contains(reported), "{reported}: {said}");
         assert!(said.contains("spec.yaml:"), "{said}");
     }
     let open = NO_PRISM.replace("f 4 8 5 1\n", "");

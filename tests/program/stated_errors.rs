@@ -29,8 +29,8 @@ fn verdicts(report: &Value) -> (usize, usize, Vec<&Value>) {
     let mine = among(report, "comparisons", &[("engine", "mine")]);
     let count = |verdict: &str| mine.iter().filter(|c| c["verdict"] == verdict).count();
     let found = among(report, "recordings", &[("engine", "mine")])[0]["stated_errors"].as_array();
-    let doubts = found.into_iter().flatten().map(|s| &s["doubt"]).filter(|d| !d.is_null()).collect();
-    (count("pass"), count("fail"), doubts)
+    let findings = found.into_iter().flatten().map(|s| &s["finding"]).filter(|d| !d.is_null()).collect();
+    (count("pass"), count("fail"), findings)
 }
 
 /// A seed is a run and more; some, and more at night.
@@ -43,29 +43,29 @@ fn all() -> usize {
 }
 
 #[test]
-fn errors_three_times_too_small_are_told_and_fail_nothing_that_is_right() {
-    let (mut told, mut failed) = (0, 0);
+fn errors_three_times_too_small_are_reported_and_fail_nothing_that_is_right() {
+    let (mut reported, mut failed) = (0, 0);
     for seed in seeds() {
         let report = run(&noise(0.009, 0.003, 0.001), SAMPLED, seed);
-        let (_, fails, doubts) = verdicts(&report);
-        told += usize::from(doubts == ["too_small"]);
+        let (_, fails, findings) = verdicts(&report);
+        reported += usize::from(findings == ["too_small"]);
         failed += usize::from(fails > 0);
     }
-    assert!(10 * told >= 9 * all() && 10 * failed <= all(), "{told} told, {failed} failed");
+    assert!(10 * reported >= 9 * all() && 10 * failed <= all(), "{reported} reported, {failed} failed");
 }
 
 #[test]
 fn right_errors_are_believed() {
-    let (mut told, mut failed) = (0, 0);
+    let (mut reported, mut failed) = (0, 0);
     for seed in seeds() {
         let report = run(&noise(0.02, 0.001, 0.001), SAMPLED, seed);
-        let (_, fails, doubts) = verdicts(&report);
-        told += doubts.len();
+        let (_, fails, findings) = verdicts(&report);
+        reported += findings.len();
         failed += usize::from(fails > 20);
         let report = run(&noise(0.0, 0.001, 0.001), SAMPLED, seed);
         assert_eq!(verdicts(&report).1, 0, "{report}");
     }
-    assert!(10 * told <= all() && 10 * failed >= 9 * all(), "{told} told, {failed} failed");
+    assert!(10 * reported <= all() && 10 * failed >= 9 * all(), "{reported} reported, {failed} failed");
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn a_heavy_tail_fails_nothing_and_names_nothing() {
         for seed in seeds() {
             let report = run(&noise, SAMPLED, seed);
             for comparison in among(&report, "comparisons", &[("engine", "mine")]) {
-                assert_eq!(comparison["verdict"], "inconclusive", "{sample}: {comparison}");
+                assert_eq!(comparison["verdict"], "undecided", "{sample}: {comparison}");
                 let said = comparison["diagnosis"].as_str().unwrap();
                 assert!(["a heavy tail", "too few samples", "undecided"].iter().any(|s| said.starts_with(s)), "{said}");
             }
@@ -93,8 +93,8 @@ fn what_is_claimed_to_be_determined_is_read_again_and_its_scatter_counts() {
     for seed in seeds() {
         for claim in ["\"exact\": True", "\"std_error_lx\": 0.0", "\"error_bound_lx\": 1e-9"] {
             let report = run(&noise(0.006, 0.004, 0.0), claim, seed);
-            let (_, fails, doubts) = verdicts(&report);
-            assert_eq!(doubts, ["scatters"], "{claim}");
+            let (_, fails, findings) = verdicts(&report);
+            assert_eq!(findings, ["scatters"], "{claim}");
             failed += usize::from(fails > 0);
         }
     }
@@ -107,18 +107,18 @@ fn what_is_claimed_to_be_determined_is_read_again_and_its_scatter_counts() {
 #[test]
 fn nothing_hides_behind_a_stated_error_of_its_own_size() {
     let report = run(&noise(0.3, 0.001, 0.3), SAMPLED, 1);
-    let (_, fails, doubts) = verdicts(&report);
-    assert_eq!((fails, doubts), (23, vec![&Value::from("too_large")]));
+    let (_, fails, findings) = verdicts(&report);
+    assert_eq!((fails, findings), (23, vec![&Value::from("too_large")]));
     // There is no chance in what is the same with every seed.
     let report = run("stated = 0.3 * lux; lux *= 1.3", SAMPLED, 1);
-    let (_, fails, doubts) = verdicts(&report);
-    assert_eq!((fails, doubts), (23, vec![&Value::from("same_for_every_seed")]));
+    let (_, fails, findings) = verdicts(&report);
+    assert_eq!((fails, findings), (23, vec![&Value::from("same_for_every_seed")]));
     // No tail of what is stated excuses readings that hardly scatter.
     let tail = "lux *= 1.06 * (1 + .001 * chance.gauss(0, 1)); stated = .002 * lux * math.exp(2 * chance.gauss(0, 1))";
     let report = run(&format!("{RANDOM}{tail}"), SAMPLED, 1);
-    let (_, fails, doubts) = verdicts(&report);
+    let (_, fails, findings) = verdicts(&report);
     // Three meters are too few to tell by: those of the other procedure may still wait.
-    assert!(fails >= 20 && doubts == ["too_large"], "{fails} {doubts:?}");
+    assert!(fails >= 20 && findings == ["too_large"], "{fails} {findings:?}");
 }
 
 /// Means of eight blocks of .3 %, with their own standard errors.
@@ -154,16 +154,16 @@ fn samples_that_happen_to_agree_are_no_claim() {
 fn nothing_hides_behind_a_single_degree_of_freedom_or_an_error_that_is_withdrawn() {
     let one = "\"std_error_lx\": stated, \"degrees_of_freedom\": 1";
     let report = run(&noise(0.5, 0.05, 0.05), one, 1);
-    let (_, fails, doubts) = verdicts(&report);
-    assert!(fails > 15 && doubts == ["more_samples"], "{fails} {doubts:?}");
-    // Two blocks have one, and are not doubted.
+    let (_, fails, findings) = verdicts(&report);
+    assert!(fails > 15 && findings == ["more_samples"], "{fails} {findings:?}");
+    // Two blocks have one, and are not reported.
     let two = "blocks = [lux * (1 + .001 * chance.gauss(0, 1)) for _ in range(2)]; lux = sum(blocks) / 2; stated = abs(blocks[0] - lux)";
-    let doubted = seeds().filter(|seed| !verdicts(&run(&format!("{RANDOM}{two}"), one, *seed)).2.is_empty()).count();
-    assert!(10 * doubted <= all(), "{doubted}");
+    let reported = seeds().filter(|seed| !verdicts(&run(&format!("{RANDOM}{two}"), one, *seed)).2.is_empty()).count();
+    assert!(10 * reported <= all(), "{reported}");
     let withdrawn = "{} if job['budget']['relative_error'] > .003 else {\"std_error_lx\": stated}";
     let report = run(&noise(0.3, 0.0, 0.24), &format!("**({withdrawn})"), 1);
-    let (_, fails, doubts) = verdicts(&report);
-    assert_eq!((fails, doubts), (23, vec![&Value::from("not_read_again")]));
+    let (_, fails, findings) = verdicts(&report);
+    assert_eq!((fails, findings), (23, vec![&Value::from("not_repeated")]));
 }
 
 #[test]
@@ -171,13 +171,13 @@ fn nothing_hides_behind_an_error_that_is_wide_at_some_meters_alone() {
     let wrong = "is_wrong = meter['position_m'][0] < 3.0; lux *= 1.5 if is_wrong else 1";
     let sampled = "lux *= 1 + .002 * chance.gauss(0, 1); stated = (.3 if is_wrong else .002) * lux";
     let bounded = "stated = (.6 if is_wrong else 1e-12) * lux";
-    for (factor, stated, doubt) in [
+    for (factor, stated, finding) in [
         (format!("{RANDOM}{wrong}; {sampled}"), SAMPLED, "too_large"),
         (format!("{wrong}; {bounded}"), "\"error_bound_lx\": stated", "beyond_tolerance"),
     ] {
         let report = run(&factor, stated, 1);
-        let (_, fails, doubts) = verdicts(&report);
-        assert!(fails > 3 && doubts.contains(&&Value::from(doubt)), "{report}");
+        let (_, fails, findings) = verdicts(&report);
+        assert!(fails > 3 && findings.contains(&&Value::from(finding)), "{report}");
         for comparison in among(&report, "comparisons", &[("engine", "mine")]) {
             let is_wrong = comparison["relative_deviation"].as_f64().unwrap() > 0.2;
             assert_eq!(comparison["verdict"], if is_wrong { "fail" } else { "pass" }, "{comparison}");
@@ -194,8 +194,8 @@ fn nothing_hides_behind_an_error_that_is_wide_at_some_meters_alone() {
 fn a_bound_that_does_not_hold_doubles_no_tolerance() {
     let off = |bias: f64| run(&format!("lux *= 1 + {bias}"), "\"error_bound_lx\": .009 * lux", 1);
     let report = off(0.017);
-    let (_, fails, doubts) = verdicts(&report);
-    assert_eq!((fails, doubts), (23, vec![&Value::from("refuted")]));
+    let (_, fails, findings) = verdicts(&report);
+    assert_eq!((fails, findings), (23, vec![&Value::from("refuted")]));
     // One that holds is believed.
     assert_eq!(verdicts(&off(0.0085)).1, 0);
 }
@@ -223,16 +223,16 @@ fn an_error_that_is_never_shown_again_counts_no_more_than_was_asked() {
     let once = "job['seed'] == 1 or sys.exit('one seed is enough'); stated = .1 * lux";
     for (bias, failing) in [(0.04, 23), (0.0, 0)] {
         let report = run(&format!("{once}; lux *= 1 + {bias}"), SAMPLED, 1);
-        let (_, fails, doubts) = verdicts(&report);
-        assert_eq!((fails, doubts), (failing, vec![&Value::from("not_read_again")]));
+        let (_, fails, findings) = verdicts(&report);
+        assert_eq!((fails, findings), (failing, vec![&Value::from("not_repeated")]));
     }
 }
 
 #[test]
 fn looks_of_a_program_that_hears_of_no_effort_count_alike() {
     let report = run(&noise(0.03, 0.003, 0.003), SAMPLED, 1);
-    let (_, fails, doubts) = verdicts(&report);
-    assert!(fails > 20 && doubts.is_empty(), "{fails} {doubts:?}");
+    let (_, fails, findings) = verdicts(&report);
+    assert!(fails > 20 && findings.is_empty(), "{fails} {findings:?}");
 }
 
 #[test]

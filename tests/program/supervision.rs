@@ -4,11 +4,11 @@ use std::fs::{self, File};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use luxproof::system::claim::Claim;
-use luxproof::system::process::sandbox_in_words;
+use luxproof_process::output_lock::OutputLock;
+use luxproof_process::process::sandbox_in_words;
 use serde_json::Value;
 
-use crate::support::{Answer, Folder, LAMP, MINE_OF_VERSION_ONE, OWN, ROOM, TWO_METERS, adapter_of_version_one, among};
+use crate::support::{Answer, Folder, LAMP, MINE, OWN, ROOM, TWO_METERS, adapter_with_lines_before_readings, among};
 
 /// Nothing here takes nearly as long, on however busy a machine.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -29,13 +29,13 @@ while not os.path.exists('pid'):
     time.sleep(0.01)
 ";
 
-/// A spec whose adapter does something before it answers.
+/// A spec with an adapter that does something before it takes readings.
 fn folder(before: &str) -> Folder {
-    let spec = [ROOM, TWO_METERS, "procedures:\n  direct_illuminance: {meters: plane}\n", MINE_OF_VERSION_ONE].concat();
+    let spec = [ROOM, TWO_METERS, "procedures:\n  direct_illuminance: {meters: plane}\n", MINE].concat();
     Folder::new(&[
         ("spec.yaml", &spec),
         ("lamp.ies", LAMP),
-        ("adapter.py", &(before.to_owned() + &adapter_of_version_one())),
+        ("adapter.py", &adapter_with_lines_before_readings(before)),
     ])
 }
 
@@ -124,7 +124,7 @@ fn of_endless_messages_the_log_keeps_both_ends() {
     }
 }
 
-/// What a supervisor of ours lets a script do, which is told a folder that it may write.
+/// What a supervisor of ours lets a script do, which gets a folder that it may write.
 fn confined(folder: &Folder, script: &str) -> Answer {
     let parent = format!("--parent={}", std::process::id());
     let writable = format!("--writable={}", folder.path("bench").display());
@@ -152,7 +152,7 @@ fn a_confined_engine_writes_in_its_own_folders_alone() {
 #[test]
 fn one_run_at_a_time_has_a_folder_and_it_is_looked_at_first() {
     let folder = folder("open('started', 'w').close()\n");
-    let claim = Claim::of(&folder.path("out")).unwrap();
+    let claim = OutputLock::of(&folder.path("out")).unwrap();
     folder.run(&[]).exits(2).complains("in use by process").complains("--out");
     drop(claim);
     folder.luxproof(&["run", "spec.yaml", "--out", "lamp.ies/out"]).exits(2).complains("no run can be kept there");

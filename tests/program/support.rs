@@ -142,7 +142,7 @@ impl Answer {
     }
 
     /// The words of standard error, without the frames of messages and however long lines were broken.
-    pub(crate) fn said(&self) -> String {
+    pub(crate) fn message(&self) -> String {
         self.stderr.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
     }
 
@@ -194,7 +194,7 @@ pub(crate) fn run_reference_in_folder(args: &[&str]) -> (Folder, Value, Option<i
 
 /// The root of this repository.
 pub(crate) fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
 }
 
 /// Those entries of a report's list whose keys have these values.
@@ -266,14 +266,28 @@ pub(crate) fn adapter() -> String {
     fs::read_to_string(root().join("docs/examples/inverse_square.py")).unwrap()
 }
 
-/// The same as it was before protocol 2: one job a process, which is all that standard input holds.
-pub(crate) fn adapter_of_version_one() -> String {
-    let example = adapter();
-    let (answers, _) = example.split_once("\n\ndef reply(").unwrap();
-    format!("{answers}\n\njson.dump(answer(json.load(sys.stdin)), sys.stdout)\n")
+/// The example adapter with one job per process. It runs these lines of Python before it answers a request for readings.
+pub(crate) fn adapter_with_lines_before_readings(lines: &str) -> String {
+    let readings = "    return {\"answers\"";
+    let mut inserted = String::new();
+    for line in lines.lines() {
+        inserted += &format!("    {line}\n");
+    }
+    let example = adapter().replace("[\"batch\"]", "[]");
+    assert_eq!(example.matches(readings).count(), 1);
+    example.replace(readings, &(inserted + readings))
 }
 
-/// That one as an engine, which is never probed.
-pub(crate) const MINE_OF_VERSION_ONE: &str = "engines:
-  mine: {command: [python3, -S, adapter.py], protocol: 1}
-";
+/// A report as luxproof would have written it: times and the checksum itself do not count.
+pub(crate) fn sealed(mut report: Value) -> String {
+    report["checksum"] = "".into();
+    let mut counted = report.to_string();
+    for name in ["\"checksum\"", "\"started\"", "\"wall_s\""] {
+        let mut parts = counted.split(name);
+        let first = parts.next().unwrap_or_default().to_owned();
+        counted = parts.fold(first, |before, part| before + name + &part[part.find([',', '}']).unwrap()..]);
+    }
+    let checksum = Sha256::digest(counted);
+    report["checksum"] = checksum.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat().into();
+    report.to_string()
+}

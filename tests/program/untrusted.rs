@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::process::Command;
 
-use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS, root};
+use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS, root, sealed};
 
 const DIRECT: &str = "procedures:\n  direct_illuminance: {meters: plane}\n";
 
@@ -20,19 +20,19 @@ fn room(spec: &str) -> Folder {
 #[track_caller]
 fn refused(from: &str, to: &str, says: &str) -> String {
     assert!(spec().contains(from), "the replacement must change the spec");
-    said(&room(&spec().replace(from, to)), says)
+    refusal_of(&room(&spec().replace(from, to)), says)
 }
 
 #[track_caller]
-fn said(room: &Folder, says: &str) -> String {
+fn refusal_of(room: &Folder, says: &str) -> String {
     let answer = room.luxproof(&["check", "--untrusted", "spec.yaml", "--engines", "simulator"]).exits(2);
-    let line = answer.said();
+    let line = answer.message();
     assert!(line.contains(says), "no `{says}` in {line}");
     line
 }
 
 #[test]
-fn files_lie_below_the_folder_wherever_links_lead_and_nothing_of_others_is_told() {
+fn files_lie_below_the_folder_wherever_links_lead_and_other_contents_stay_secret() {
     let secret = "TILT of a secret";
     let outside = Folder::new(&[("secret", secret), ("lamp.ies", LAMP)]);
     let place = outside.path("secret");
@@ -47,40 +47,42 @@ fn files_lie_below_the_folder_wherever_links_lead_and_nothing_of_others_is_told(
         symlink(&place, room.path("link.ies")).unwrap();
         // An LM-63 file names a file of tilt factors beside it, which is a link.
         room.write("tilted.ies", &LAMP.replace("TILT=NONE", "TILT=link.ies"));
-        let told = said(&room, "below the spec's folder");
-        assert!(!told.contains(secret), "{told}");
+        let reported = refusal_of(&room, "below the spec's folder");
+        assert!(!reported.contains(secret), "{reported}");
     }
     // The spec itself, and a policy beside it.
     let room = room(&spec());
     symlink(&place, room.path("link.ies")).unwrap();
     room.write("tilted.ies", &LAMP.replace("TILT=NONE", "TILT=link.ies"));
-    let told = room.luxproof(&["photometry", "tilted.ies", "--untrusted"]).exits(2).complains("cannot be followed");
-    assert!(!told.stderr.contains(secret), "{told:?}");
+    let reported = room.luxproof(&["photometry", "tilted.ies", "--untrusted"]).exits(2).complains("cannot be followed");
+    assert!(!reported.stderr.contains(secret), "{reported:?}");
     fs::rename(room.path("spec.yaml"), room.path("away")).unwrap();
     symlink(&place, room.path("spec.yaml")).unwrap();
-    assert!(!said(&room, "it is a link").contains(secret));
+    assert!(!refusal_of(&room, "it is a link").contains(secret));
     fs::remove_file(room.path("spec.yaml")).unwrap();
     fs::rename(room.path("away"), room.path("spec.yaml")).unwrap();
     symlink(&place, room.path("luxproof.yaml")).unwrap();
-    assert!(!said(&room, "it is a link").contains(secret));
+    assert!(!refusal_of(&room, "it is a link").contains(secret));
 }
 
 #[test]
-fn no_program_is_started_and_those_of_the_users_own_are_told() {
+fn no_program_is_started_and_the_users_own_are_listed() {
     let room = Folder::new(&[("spec.yaml", &[&spec(), MINE].concat()), ("lamp.ies", LAMP)]);
-    said(&room, "engines.mine.command: it would run a program");
+    refusal_of(&room, "engines.mine.command: it would run a program");
     let as_set = |value: &str| Answer::of(room.command(&["check", "spec.yaml"]).env("LUXPROOF_UNTRUSTED", value));
     as_set("1").exits(2).complains("not trusted");
     assert_ne!(as_set("0").code, Some(2));
     // In a case of a suite likewise.
     let cases = "cases:\n  - {name: a, engines: {mine: {command: [touch, pwned]}}}\n";
-    said(&self::room(&(spec() + cases)), "it would run a program");
+    refusal_of(&self::room(&(spec() + cases)), "it would run a program");
     let answer = room.run(&["--engines", "mine"]);
     assert!(answer.stderr.contains("engines.mine runs `python3"), "{}", answer.stderr);
     // The doctor would have engines of a spec read scenes of known answer.
     room.luxproof(&["engines", "doctor", "--spec", "spec.yaml", "--untrusted"]).exits(2).complains("not trusted");
     for command in ["hunt", "selftest"] {
-        Answer::of(room.command(&[command]).env("LUXPROOF_UNTRUSTED", "1")).exits(2).complains("user's own alone");
+        Answer::of(room.command(&[command]).env("LUXPROOF_UNTRUSTED", "1"))
+            .exits(2)
+            .complains("does not run untrusted specs");
     }
 }
 
@@ -95,25 +97,25 @@ fn what_it_asks_for_is_bounded() {
     // Each within its limit, and together beyond what is planned in a second.
     let grid = grid.replace("[101, 100]", "[10, 10]");
     let crowd = many.lines().skip(1).collect::<Vec<_>>().join("\n");
-    said(&room(&spec().replace(&meters, &grid).replace(&lamp, &crowd)), "25000000 pairs of luminaires");
+    refusal_of(&room(&spec().replace(&meters, &grid).replace(&lamp, &crowd)), "25000000 pairs of luminaires");
     let long = LAMP.replacen("[TEST]", &("[OTHER] much said\n".repeat(60_000) + "[TEST]"), 1);
     let two = room(&spec().replace(&lamp, &format!("{lamp}\n{}", lamp.replace("lamp", "lamq"))));
     two.write("lamp.ies", &long);
     two.write("lamq.ies", &long);
-    said(&two, "bytes of files are more than");
+    refusal_of(&two, "bytes of files are more than");
     let listed = (0..200).map(|k| (f64::from(k) * 0.9).to_string()).collect::<Vec<_>>().join(", ");
     let angles = format!(
         "procedures:\n  luminous_intensity: {{luminaire: lamp, distance_m: 5, angles: {{gamma_deg: [{listed}], c_deg: [{listed}]}}}}\n"
     );
     refused(DIRECT, &angles, "40000 angles are more than the 9998");
     let cases: Vec<String> = (0..101).map(|k| format!("  - {{name: c{k}}}\n")).collect();
-    said(&room(&(spec() + "cases:\n" + &cases.concat())), "a spec holds 100 cases at most");
+    refusal_of(&room(&(spec() + "cases:\n" + &cases.concat())), "a spec holds 100 cases at most");
     refused("title: a test room", &format!("title: {}", "a".repeat(1 << 20)), "more than 1 MB");
     refused("meters: plane", "meters: [plane, plane]", "stands there twice");
 }
 
 #[test]
-fn depth_and_length_are_refused_and_told_in_a_few_lines() {
+fn depth_and_length_are_refused_in_a_few_lines() {
     for text in [
         "title: ".to_owned() + &"[".repeat(100_000),
         "title: ".to_owned() + &"[".repeat(100_000) + &"]".repeat(100_000),
@@ -144,23 +146,26 @@ fn aliases_attributes_and_cases_multiply_nothing() {
                 .arg(check.get_program())
                 .args(check.get_args());
             let answer = Answer::of(small.current_dir(room.path("")).env("NO_COLOR", "1")).exits(2);
-            assert!(answer.said().contains(says), "{answer:?}");
+            assert!(answer.message().contains(says), "{answer:?}");
         }
     }
     // A spec of many values has few cases.
     let cases = (0..50).map(|k| format!("  - {{name: c{k}}}\n")).collect::<Vec<_>>().concat();
     let points = "[1, 1, 0.8]";
     let many = spec().replace(points, &(format!("{points}, ").repeat(9_000) + points)) + "cases:\n" + &cases;
-    said(&room(&many), "cases at most");
+    refusal_of(&room(&many), "cases at most");
     let boxes = "  - {box: {min_m: [0, 0, 0], max_m: [1, 1, 0.1], reflectance: 0}}\n".repeat(4_500);
-    said(&room(&spec().replace("meters:\n", &format!("obstacles:\n{boxes}meters:\n"))), "triangles are more than");
+    refusal_of(
+        &room(&spec().replace("meters:\n", &format!("obstacles:\n{boxes}meters:\n"))),
+        "triangles are more than",
+    );
     let engines = (0..6_000).map(|k| format!("  e{k}: {{}}\n")).collect::<Vec<_>>().concat();
-    let told = said(&room(&(spec() + "engines:\n" + &engines)), "50 faults, and no more are told");
-    assert!(told.contains("no engine `e0`") && told.len() < 20_000, "{told}");
+    let reported = refusal_of(&room(&(spec() + "engines:\n" + &engines)), "50 faults, and no more are listed");
+    assert!(reported.contains("no engine `e0`") && reported.len() < 20_000, "{reported}");
     let attributes = (0..100_000).map(|k| format!(" a{k}=''")).collect::<Vec<_>>().concat();
     let room = room(&spec().replace("lamp.ies", "lamp.xml"));
     room.write("lamp.xml", &format!("<IESTM33-22{attributes}/>"));
-    said(&room, "more than 64 attributes");
+    refusal_of(&room, "more than 64 attributes");
 }
 
 #[test]
@@ -200,9 +205,8 @@ fn what_does_something_to_a_terminal_is_refused_or_shown_as_what_it_is_not() {
     room.write("spec.yaml", &spec());
     room.run(&["--engines", "simulator"]);
     let mut report = room.report();
-    report["luxproof"] = 2.into();
     report["spec"]["title"] = "\u{1b}]0;x\u{7}\u{202e}".into();
-    room.write("other.json", &report.to_string());
+    room.write("other.json", &sealed(report));
     for format in ["terminal", "markdown", "junit", "csv", "html", "json"] {
         is_quiet(&room.luxproof(&["report", "other.json", "--format", format]));
     }

@@ -11,7 +11,7 @@ fn run(spec: &str) -> Value {
 }
 
 /// What is said of what an engine fails in a procedure, and the worst deviation.
-fn told(report: &Value, engine: &str, procedure: &str) -> (String, f64) {
+fn reported(report: &Value, engine: &str, procedure: &str) -> (String, f64) {
     let fails = among(report, "comparisons", &[("engine", engine), ("procedure", procedure), ("verdict", "fail")]);
     let off = |c: &&Value| c["relative_deviation"].as_f64().unwrap_or(0.0).abs();
     let first = fails.first().unwrap_or_else(|| panic!("nothing fails in {procedure}"));
@@ -22,7 +22,7 @@ fn told(report: &Value, engine: &str, procedure: &str) -> (String, f64) {
 fn three_js_0_179_squares_the_candela_of_one_plane() {
     let report = run("three-0.179.yaml");
     for procedure in ["luminous_intensity", "direct_illuminance"] {
-        let (said, worst) = told(&report, "three", procedure);
+        let (said, worst) = reported(&report, "three", procedure);
         assert!(said.contains("only the plane C 0 is read, the candela are squared"), "{procedure}: {said}");
         assert!(worst > 0.3, "{worst}");
     }
@@ -31,7 +31,7 @@ fn three_js_0_179_squares_the_candela_of_one_plane() {
 #[test]
 fn three_js_0_187_is_right_but_behind_its_light() {
     let report = run("three-0.187.yaml");
-    let (said, _) = told(&report, "three", "luminous_intensity");
+    let (said, _) = reported(&report, "three", "luminous_intensity");
     assert!(said.contains("beyond a gamma of 90 degrees C is turned by 180 degrees"), "{said}");
     let mine = among(&report, "comparisons", &[("engine", "three"), ("procedure", "luminous_intensity")]);
     for c in mine.iter().filter(|c| c["gamma_deg"].as_f64().unwrap() < 90.0) {
@@ -43,7 +43,7 @@ fn three_js_0_187_is_right_but_behind_its_light() {
 #[test]
 fn babylon_js_reads_one_plane() {
     let report = run("babylon.yaml");
-    let (said, worst) = told(&report, "babylon", "luminous_intensity");
+    let (said, worst) = reported(&report, "babylon", "luminous_intensity");
     assert!(said.contains("light is the same in every C plane"), "{said}");
     assert!(worst > 0.3, "{worst}");
 }
@@ -53,7 +53,10 @@ fn babylon_js_reads_one_plane() {
 fn the_doctor_finds_them_as_they_are_on_record() {
     let folder = Folder::for_renderers(&[]);
     let answer = folder.luxproof(&["engines", "doctor", "three", "babylon"]).exits(0);
-    let told = answer.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(told.contains("127 passed, 0 failed, 0 undecided, 82 known deviations, 0 unexpected passes"), "{told}");
-    assert!(told.contains("babylon: calibration: asymmetric only as is on record"), "{told}");
+    let reported = answer.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        reported.contains("127 passed, 0 failed, 0 undecided, 82 known deviations, 0 unexpected passes"),
+        "{reported}"
+    );
+    assert!(reported.contains("babylon: calibration: asymmetric only as is on record"), "{reported}");
 }

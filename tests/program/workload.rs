@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::support::{Folder, LAMP, MINE, ROOM, adapter};
+use crate::support::{Folder, LAMP, MINE, ROOM, adapter, adapter_with_lines_before_readings};
 
 const METERS: &str = "meters:
   plane: {points_m: [[1, 1, 0.8], [3, 2, 0.8], [5, 3.5, 0.1]], normal: [0, 0, 1]}
@@ -138,8 +138,8 @@ fn what_others_read_in_rounds_makes_the_report_of_one_run() {
     let jobs = first["jobs"].as_array().unwrap();
     assert!(jobs.iter().any(|job| job["cases"] == serde_json::json!(["spec/again", "spec/bright"])), "{jobs:?}");
     assert!(lab.read_all() >= 2);
-    let (joined, told) = lab.report_from_cache();
-    assert_eq!((joined, told.contains("not read yet")), (code, false), "{told}");
+    let (joined, reported) = lab.report_from_cache();
+    assert_eq!((joined, reported.contains("not read yet")), (code, false), "{reported}");
     let looks = |report: &Value| report["readings"].to_string();
     let (run, joined) = (lab.0.json("out/report.json"), lab.0.json("joined/report.json"));
     assert_eq!(looks(&run), looks(&joined));
@@ -178,8 +178,8 @@ fn a_reading_that_is_lost_is_missed_by_name_and_read_again() {
     fs::remove_file(lab.0.path("shared").join(&lost).with_extension("json")).unwrap();
     let plan = lab.plan("plan.json");
     assert_eq!(ids(&plan, false), [lost.as_str()]);
-    let (code, told) = lab.report_from_cache();
-    assert!(code == Some(3) && told.contains("1 job(s) are not read yet"), "{code:?} {told}");
+    let (code, reported) = lab.report_from_cache();
+    assert!(code == Some(3) && reported.contains("1 job to be read"), "{code:?} {reported}");
     // What a killed process had begun to write is no reading.
     fs::write(lab.0.path("shared").join(&lost).with_extension("json"), "{").unwrap();
     assert_eq!(ids(&lab.plan("plan.json"), false), [lost.as_str()]);
@@ -189,7 +189,7 @@ fn a_reading_that_is_lost_is_missed_by_name_and_read_again() {
 
 #[test]
 fn a_failure_is_tried_again_until_it_is_taken_for_the_answer() {
-    let lab = Lab::new("import sys\nsys.exit('no light today')\n");
+    let lab = Lab::new(&adapter_with_lines_before_readings("sys.exit('no light today')"));
     let code = lab.0.luxproof(&["run", "spec.yaml", "--out", "out"]).exits(3).code;
     let plan = lab.plan("plan.json");
     let open: Vec<String> = ids(&plan, false).into_iter().filter(|id| id.starts_with("mine/")).collect();

@@ -1,0 +1,191 @@
+//! Laws of shortcuts: left-out readings agree with the exact simulation, and asymmetric scenes have no symmetry.
+
+use glam::DVec3;
+use luxproof_photometry::LuminousOpening;
+use luxproof_scene::{Bounces, LuminaireModel, Obstacle, Scene, Shape, Transport, flush, orientation};
+use luxproof_simulator::{Accuracy, illuminance};
+
+use super::*;
+use luxproof_engines::fixtures;
+use luxproof_model::Uncertainty;
+
+const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
+
+fn grid(size_m: DVec3, z_m: f64) -> Vec<[f64; 3]> {
+    let parts = [0.125, 0.375, 0.625, 0.875];
+    parts.iter().flat_map(|x| parts.iter().map(move |y| [x * size_m.x, y * size_m.y, z_m])).collect()
+}
+
+fn symmetric_job(size_m: DVec3, transport: Transport) -> Job {
+    let lamp = fixtures::luminaire("lamp", size_m * DVec3::new(0.5, 0.5, 0.8), fixtures::quadrant());
+    let room = Some(fixtures::room(size_m, 0.2, 0.5, 0.7));
+    let sensors = fixtures::sensors(&grid(size_m, 0.8), DVec3::Z);
+    fixtures::job(Scene { room, obstacles: vec![], luminaires: vec![lamp] }, sensors, transport)
+}
+
+fn exact(job: &Job) -> Measurement {
+    let meters: Vec<_> = job.sensors.iter().map(|s| s.meter).collect();
+    let accuracy = Accuracy { relative_error: 1e-6, seed: 1 };
+    let solution = illuminance(&job.scene, &meters, job.transport, &accuracy).unwrap();
+    let values = solution.estimates.iter().map(|e| e.illuminance.value());
+    let estimates = values.map(|value| Estimate { value, uncertainty: Uncertainty::Unstated }).collect();
+    Measurement { estimates, ..Measurement::default() }
+}
+
+/// What a shortcut completes agrees with what the whole job reads.
+#[track_caller]
+fn holds(job: &Job) -> Shortcut {
+    let shortcut = Shortcut::of(job);
+    let whole = exact(job);
+    let rendered = if shortcut.job.sensors.is_empty() { Measurement::default() } else { exact(&shortcut.job) };
+    let completed = shortcut.complete(rendered, job);
+    let brightest = whole.estimates.iter().map(|e| e.value).fold(0.0, f64::max);
+    assert_eq!(completed.estimates.len(), job.sensors.len());
+    for ((c, w), s) in completed.estimates.iter().zip(&whole.estimates).zip(&job.sensors) {
+        assert!((c.value - w.value).abs() <= 1e-5 * brightest, "{}: {} for {}", s.id, c.value, w.value);
+    }
+    shortcut
+}
+
+#[test]
+fn of_an_oblong_room_a_quarter_is_rendered_and_of_a_square_one_with_an_axial_lamp_an_eighth() {
+    let oblong = symmetric_job(DVec3::new(6.0, 4.0, 3.0), CONVERGED);
+    assert_eq!(holds(&oblong).job.sensors.len(), 4);
+    let mut square = symmetric_job(DVec3::new(5.0, 5.0, 3.0), CONVERGED);
+    // The lamp's planes are not exchanged with the axes.
+    assert_eq!(holds(&square).job.sensors.len(), 4);
+    let table =
+        luxproof_photometry::LuminousIntensityDistribution::axial(vec![0.0, 60.0, 90.0], vec![900.0, 400.0, 0.0]);
+    square.scene.luminaires[0].photometry = fixtures::photometry(table.unwrap());
+    let shortcut = holds(&square);
+    assert_eq!(shortcut.job.sensors.len(), 3);
+    let settings = shortcut.complete(exact(&shortcut.job), &square).effort;
+    // Every meter that is filled in is traced to the one that was rendered.
+    assert_eq!(settings["mirrored_meters"].matches(" is ").count(), 13, "{settings:?}");
+    assert!(shortcut.omissions.iter().all(|o| !o.reason.is_empty() && o.share > 0.0 && o.share <= 1.0));
+}
+
+#[test]
+fn recessed_panels_are_as_symmetric_as_their_places() {
+    let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.4, height_m: 0.0 };
+    for (last_x, expected) in [(4.5, 4), (4.4, 16)] {
+        let panels = [(1.5, 1.0), (4.5, 1.0), (1.5, 3.0), (last_x, 3.0)].map(|(x, y)| {
+            let lamp = fixtures::luminaire("panel", DVec3::new(x, y, 3.0), fixtures::lambertian());
+            fixtures::with_opening(lamp, opening)
+        });
+        let room = job.scene.room.unwrap();
+        job.scene.obstacles = panels.iter().filter_map(|l| flush::plate(&room, l)).collect();
+        job.scene.luminaires = panels.into();
+        assert_eq!(holds(&job).job.sensors.len(), expected);
+    }
+}
+
+#[test]
+fn whatever_breaks_the_symmetry_has_every_meter_rendered() {
+    let whole = symmetric_job(DVec3::new(6.0, 4.0, 3.0), CONVERGED);
+    let desk = Obstacle { shape: Shape::Box { min_m: DVec3::splat(0.2), max_m: DVec3::splat(0.6) }, reflectance: 0.5 };
+    // One broken mirror leaves the other.
+    assert_eq!(rendered_after(&whole, |job| job.scene.room.as_mut().unwrap().reflectance.wall_x_max = 0.4), 8);
+    assert_eq!(rendered_after(&whole, |job| job.scene.luminaires[0].position_m.x += 0.01), 8);
+    assert_eq!(rendered_after(&whole, |job| job.scene.luminaires[0].position_m += DVec3::new(0.01, 0.01, 0.0)), 16);
+    // A lamp that is turned is still the same after half a turn.
+    assert_eq!(rendered_after(&whole, |job| job.scene.luminaires[0].orientation = orientation(20.0, 0.0, 0.0)), 8);
+    assert_eq!(
+        rendered_after(&whole, |job| job.scene.luminaires[0].photometry = fixtures::photometry(fixtures::lopsided())),
+        16
+    );
+    assert_eq!(rendered_after(&whole, |job| job.scene.obstacles.push(desk.clone())), 16);
+    // In free field, where procedure 1 reads its angles, all are read: they are what it is about.
+    let free = rendered_after(&whole, |job| (job.scene.room, job.transport) = (None, Transport::Direct));
+    assert_eq!(free, 16);
+    let with_twin = rendered_after(&whole, |job| {
+        let mut twin = job.scene.luminaires[0].clone();
+        twin.position_m.x = 1.0;
+        job.scene.luminaires[0].position_m.x = 5.0;
+        twin.flux_scale = 0.9;
+        job.scene.luminaires.push(twin);
+    });
+    assert_eq!(with_twin, 8);
+}
+
+/// The number of sensors that are rendered after a change of a job.
+fn rendered_after(job: &Job, change: impl FnOnce(&mut Job)) -> usize {
+    let mut job = job.clone();
+    change(&mut job);
+    Shortcut::of(&job).job.sensors.len()
+}
+
+#[test]
+fn bodies_and_several_lamps_in_symmetric_places_keep_the_symmetry() {
+    let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+    for x in [1.0, 4.4] {
+        let shape = Shape::Box { min_m: DVec3::new(x, 1.7, 0.0), max_m: DVec3::new(x + 0.6, 2.3, 0.7) };
+        job.scene.obstacles.push(Obstacle { shape, reflectance: 0.5 });
+    }
+    let mut twin = job.scene.luminaires[0].clone();
+    job.scene.luminaires[0].position_m.x = 1.5;
+    twin.position_m.x = 4.5;
+    job.scene.luminaires.push(twin);
+    assert_eq!(holds(&job).job.sensors.len(), 4);
+}
+
+#[test]
+fn meters_without_direct_light_are_zero_without_a_ray() {
+    let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+    job.scene.luminaires[0].photometry = fixtures::photometry(fixtures::axial_uplight());
+    let shortcut = holds(&job);
+    assert!(shortcut.job.sensors.is_empty() && shortcut.fill.iter().all(|f| *f == Fill::Dark));
+    job.scene.luminaires[0].model = LuminaireModel::Area;
+    assert!(Shortcut::of(&job).job.sensors.is_empty());
+    // A lamp tilted so that it lights a part of the meters, and one whose table ends just beside them.
+    job.scene.luminaires[0].model = LuminaireModel::Point;
+    job.scene.luminaires[0].orientation = orientation(0.0, 40.0, 0.0);
+    let lit = holds(&job).job.sensors.len();
+    assert!((1..16).contains(&lit), "{lit}");
+    let mut back = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+    back.sensors = fixtures::sensors(&grid(DVec3::new(6.0, 4.0, 3.0), 0.8), DVec3::NEG_Z);
+    assert!(holds(&back).job.sensors.is_empty());
+}
+
+#[test]
+fn black_rooms_have_no_reflected_light_and_one_flat_surface_reflects_once() {
+    let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), CONVERGED);
+    job.scene.room = Some(fixtures::room(DVec3::new(6.0, 4.0, 3.0), 0.0, 0.0, 0.0));
+    assert!(holds(&job).job.sensors.is_empty());
+    job.transport = Transport::Total(Bounces::Converged);
+    assert_eq!(holds(&job).job.transport, Transport::Direct);
+    job.scene.room = Some(fixtures::room(DVec3::new(6.0, 4.0, 3.0), 0.6, 0.0, 0.0));
+    job.transport = CONVERGED;
+    assert_eq!(Shortcut::of(&job).job.transport, Transport::Indirect(Bounces::AtMost(1)));
+    job.scene.room = Some(fixtures::room(DVec3::new(6.0, 4.0, 3.0), 0.6, 0.0, 0.1));
+    assert_eq!(Shortcut::of(&job).job.transport, CONVERGED);
+    job.scene.room = Some(fixtures::room(DVec3::new(6.0, 4.0, 3.0), 0.5, 0.5, 0.5));
+    job.transport = Transport::Indirect(Bounces::AtMost(0));
+    assert!(Shortcut::of(&job).job.sensors.is_empty());
+}
+
+#[test]
+fn a_job_that_differs_in_flux_alone_is_rescaled_and_an_equal_one_is_rendered_once() {
+    let engines = luxproof_engines::all();
+    let radiance = engines.iter().find(|e| e.name() == "radiance").unwrap();
+    let first = symmetric_job(DVec3::new(6.0, 4.0, 3.0), CONVERGED);
+    let mut planned_jobs = PlannedJobs::default();
+    let equal = Job { case: "other".into(), ..first.clone() };
+    let mut dimmed = Job { case: "dimmed".into(), ..first.clone() };
+    dimmed.scene.luminaires[0].flux_scale = 0.3;
+    let other = Job { case: "seed".into(), seed: 2, ..first.clone() };
+    let [planned, equal, rescaled, other] = [&first, &equal, &dimmed, &other].map(|job| {
+        let mut shortcut = Shortcut::of(job);
+        planned_jobs.shorten(&mut shortcut, radiance.as_ref());
+        shortcut
+    });
+    assert_eq!((planned.factor, planned.omissions.len()), (1.0, 1));
+    assert_eq!((equal.factor, equal.omissions.len()), (1.0, 2));
+    assert!((rescaled.factor - 0.3).abs() < 1e-12);
+    let (completed, whole) = (rescaled.complete(exact(&rescaled.job), &dimmed), exact(&dimmed));
+    for (c, w) in completed.estimates.iter().zip(&whole.estimates) {
+        assert!((c.value / w.value - 1.0).abs() < 1e-5, "{c:?} {w:?}");
+    }
+    assert_eq!(other.omissions.len(), 1);
+}

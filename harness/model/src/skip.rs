@@ -1,0 +1,53 @@
+//! Skips: jobs or parts of jobs that were not run, and why.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{EngineName, ReadingKey};
+
+/// A job or a part of it that is not run, with its reason.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Skip {
+    #[serde(flatten)]
+    pub key: ReadingKey,
+    /// How much is skipped.
+    pub scope: Scope,
+    pub reason: String,
+    /// The saving, where there is one.
+    pub saved: Option<String>,
+}
+
+impl Skip {
+    /// A skip that saves nothing.
+    pub fn new(key: ReadingKey, scope: Scope, reason: impl Into<String>) -> Self {
+        Self { key, scope, reason: reason.into(), saved: None }
+    }
+
+    /// The skip with its saving.
+    #[must_use]
+    pub fn saving(self, saved: impl Into<String>) -> Self {
+        Self { saved: Some(saved.into()), ..self }
+    }
+}
+
+/// How much is skipped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scope {
+    Engine,
+    /// One procedure of an engine.
+    Procedure,
+    Meter,
+    /// One kind of light path.
+    LightPath,
+}
+
+impl Scope {
+    /// Whether nothing is read. Skipped meters and light paths have readings that follow from others.
+    pub const fn leaves_no_reading(self) -> bool {
+        matches!(self, Self::Engine | Self::Procedure)
+    }
+}
+
+/// The name for all engines in skips that concern every engine.
+pub const EVERYONE: EngineName = EngineName::new("all");

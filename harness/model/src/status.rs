@@ -1,0 +1,133 @@
+//! The role of an engine and its status in a run.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{EngineName, Exit};
+
+/// An engine in a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EngineStatus {
+    /// The engine's name.
+    pub id: EngineName,
+    /// Its version, where it is installed.
+    pub version: Option<String>,
+    /// Whether it is judged or a reference.
+    #[serde(default)]
+    pub role: Role,
+    /// Hash of all that it runs: programs, libraries, packages, sources.
+    #[serde(default)]
+    pub fingerprint: Option<String>,
+    pub status: Status,
+    /// Whether it was requested by name, so that its absence is an error.
+    #[serde(default)]
+    pub is_required: bool,
+    /// Why it did not run.
+    pub reason: Option<String>,
+    /// Wall-clock seconds over all procedures.
+    pub wall_s: f64,
+    /// The number of its colour and mark in plots, which is fixed for a built-in engine.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mark: Option<usize>,
+}
+
+impl EngineStatus {
+    /// Adds the status of the same engine in another case. A failure outweighs everything, and a single run counts as ran.
+    pub fn join(&mut self, other: Self) {
+        self.wall_s += other.wall_s;
+        if other.status.weight() > self.status.weight() {
+            *self = Self { wall_s: self.wall_s, ..other };
+        } else if other.status == Status::Failed {
+            let reasons: Vec<String> = [self.reason.take(), other.reason].into_iter().flatten().collect();
+            self.reason = Some(reasons.join("; "));
+        }
+    }
+}
+
+impl EngineStatus {
+    /// The exit code for this engine alone.
+    pub(crate) const fn exit(&self) -> Exit {
+        match self.status {
+            Status::Failed => Exit::Engine,
+            Status::Absent if self.is_required => Exit::Engine,
+            _ => Exit::Passed,
+        }
+    }
+}
+
+/// The status of an engine in a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Every job gave readings.
+    Ran,
+    /// It is not installed.
+    Absent,
+    /// At least one job failed.
+    Failed,
+    /// It supports nothing that was requested.
+    Skipped,
+}
+
+impl Status {
+    /// The status with the larger weight counts for several cases.
+    const fn weight(self) -> u8 {
+        match self {
+            Self::Skipped => 0,
+            Self::Absent => 1,
+            Self::Ran => 2,
+            Self::Failed => 3,
+        }
+    }
+}
+
+/// The role of an engine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// A reference: one of our solvers. It always runs, and costs little.
+    Reference,
+    /// It is judged.
+    #[default]
+    Renderer,
+    /// Values that somebody published or measured: judged, never run, and never a reference, a witness or a baseline.
+    Recorded,
+}
+
+impl Role {
+    /// Whether its readings are judged. A run without a judged reading audits nothing.
+    pub const fn is_judged(self) -> bool {
+        matches!(self, Self::Renderer | Self::Recorded)
+    }
+}
+
+/// Why there is no reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema, strum::Display)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum FailureKind {
+    /// The engine does not support such a job: a skip.
+    Declined,
+    /// It rejects this job: a setting is invalid for it, or its solver gave up.
+    Refused,
+    Nan,
+    /// It ended with an error or was killed.
+    Crash,
+    Hang,
+    /// It ended normally without all readings.
+    SilentLoss,
+    /// It ended normally, and its output is not readable.
+    Garbled,
+    Interrupted,
+    /// It was not started, because the time limit had passed.
+    TimeUp,
+    /// It was not requested here: another process or machine will read it.
+    Unread,
+}
+
+impl FailureKind {
+    /// Whether the engine had the chance to answer.
+    pub const fn is_an_answer(self) -> bool {
+        !matches!(self, Self::Interrupted | Self::TimeUp | Self::Unread)
+    }
+}

@@ -1,0 +1,188 @@
+//! A scene as its reader found it: triangles by material, in the file's unit and axes, and what is none of that.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use luxproof_scene::geometry::polygon::Triangulator;
+
+use luxproof_spec::{SpecError, Trust};
+
+/// A scene of more triangles is imported in parts.
+pub(super) const MAX_TRIANGLES: usize = 2_000_000;
+
+/// More notes say nothing new.
+const MAX_NOTES: usize = 200;
+
+/// The name of what has no material.
+pub(super) const NO_MATERIAL: &str = "default";
+
+/// Weights by which red, green and blue make a luminous reflectance (Radiance's, of its own primaries).
+const LUMINOUS: [f64; 3] = [0.265, 0.670, 0.065];
+
+/// What a surface is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Kind {
+    /// Opaque, diffuse and plain, of such a colour.
+    Diffuse { rgb: [f64; 3] },
+    /// It shines.
+    Light(String),
+    /// Anything else, in words.
+    Other(String),
+    /// The scene does not say.
+    Unknown,
+}
+
+impl Kind {
+    /// A colour, each part from 0 to 1.
+    pub(super) fn of_colour(rgb: [f64; 3]) -> Result<Self, String> {
+        match rgb.iter().find(|part| !(0.0..=1.0).contains(*part)) {
+            Some(part) => Err(format!("a reflectance lies between 0 and 1, not at {part}")),
+            None => Ok(Self::Diffuse { rgb }),
+        }
+    }
+}
+
+/// The share of daylight that a colour reflects, to six decimals.
+pub(super) fn luminous(rgb: [f64; 3]) -> f64 {
+    let sum: f64 = if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
+        rgb[0]
+    } else {
+        rgb.iter().zip(LUMINOUS).map(|(part, weight)| part * weight).sum()
+    };
+    (sum * 1e6).round() / 1e6
+}
+
+/// A material of the scene.
+#[derive(Clone, Debug)]
+pub(super) struct Material {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+    /// The file that says so, and the line.
+    pub(super) file: PathBuf,
+    pub(super) line: Option<usize>,
+    /// Polygons, or whatever the file draws.
+    pub(super) surfaces: usize,
+    /// The line of the first of them in the scene.
+    pub(super) first: Option<usize>,
+}
+
+/// A triangle of a material.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Triangle {
+    pub(super) corners: [DVec3; 3],
+    pub(super) material: u32,
+}
+
+/// What of a scene is no surface of a material: how many, and the line of the first.
+pub(super) type Others = BTreeMap<&'static str, (usize, Option<usize>)>;
+
+/// A scene.
+#[derive(Debug)]
+pub(super) struct Raw<'a> {
+    pub(super) scene: &'a Scene<'a>,
+    pub(super) materials: Vec<Material>,
+    pub(super) triangles: Vec<Triangle>,
+    pub(super) others: Others,
+    /// Further notes, each once.
+    pub(super) notes: Vec<String>,
+    /// What its coordinates are known to, relative to its extent.
+    pub(super) precision: f64,
+    triangulator: Triangulator,
+}
+
+/// The file that is imported, and whose it is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scene<'a> {
+    pub(super) path: &'a Path,
+    pub(super) trust: Trust,
+}
+
+impl Scene<'_> {
+    /// An error at a line of the scene.
+    pub(super) fn fault(&self, line: Option<usize>, message: impl Into<String>, help: impl Into<String>) -> SpecError {
+        SpecError { line, ..SpecError::of(self.path, message, help) }
+    }
+
+    pub(super) fn bytes(&self) -> Result<Vec<u8>, SpecError> {
+        let read = self.trust.read_named(self.folder(), self.path);
+        read.map_err(|e| self.fault(None, format!("cannot be read: {e}"), "check the path"))
+    }
+
+    pub(super) fn path_of(&self, name: &str) -> PathBuf {
+        self.folder().join(name)
+    }
+
+    /// The bytes of a file that the scene names.
+    pub(super) fn read(&self, path: &Path) -> std::io::Result<Vec<u8>> {
+        self.trust.read_named(self.folder(), path)
+    }
+
+    fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+}
+
+impl<'a> Raw<'a> {
+    pub(super) fn new(scene: &'a Scene<'a>, precision: f64) -> Self {
+        Self {
+            scene,
+            materials: vec![],
+            triangles: vec![],
+            others: Others::new(),
+            notes: vec![],
+            precision,
+            triangulator: Triangulator::default(),
+        }
+    }
+
+    /// Adds a material and gives its place.
+    pub(super) fn material(&mut self, name: &str, kind: Kind, file: &Path, line: Option<usize>) -> u32 {
+        let (name, file) = (name.to_owned(), file.to_owned());
+        self.materials.push(Material { name, kind, file, line, surfaces: 0, first: None });
+        (self.materials.len() - 1) as u32
+    }
+
+    pub(super) fn note(&mut self, note: impl Into<String>) {
+        let note = note.into();
+        if self.notes.len() < MAX_NOTES && !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    pub(super) fn leave_out(&mut self, what: &'static str, count: usize, line: Option<usize>) {
+        self.others.entry(what).or_insert((0, line)).0 += count;
+    }
+
+    /// Counts a surface of a material.
+    pub(super) fn surface(&mut self, material: u32, line: Option<usize>) {
+        if let Some(of) = self.materials.get_mut(material as usize) {
+            of.surfaces += 1;
+            of.first = of.first.or(line);
+        }
+    }
+
+    pub(super) fn triangle(
+        &mut self,
+        material: u32,
+        line: Option<usize>,
+        corners: [DVec3; 3],
+    ) -> Result<(), SpecError> {
+        let most = MAX_TRIANGLES.min(self.scene.trust.max_triangles());
+        if self.triangles.len() >= most {
+            let message = format!("the scene has more than {most} triangles");
+            return Err(self.scene.fault(line, message, "import a part of it, or have its meshes simplified first"));
+        }
+        self.triangles.push(Triangle { corners, material });
+        Ok(())
+    }
+
+    /// Adds a surface that is a polygon.
+    pub(super) fn polygon(&mut self, material: u32, line: Option<usize>, corners: &[DVec3]) -> Result<(), SpecError> {
+        self.surface(material, line);
+        let cut = self.triangulator.triangles(corners).map_err(|why| {
+            self.scene.fault(line, format!("this polygon is none: {why}"), "have it cut into triangles first")
+        })?;
+        cut.into_iter().try_for_each(|t| self.triangle(material, line, t.map(|k| corners[k])))
+    }
+}

@@ -1,0 +1,344 @@
+//! Innovations: the deviations of a night from the prediction of the nights before, and the noise that they show.
+
+use std::rc::Rc;
+
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::series::Series;
+
+/// An innovation moves an estimate without limit until so many are known.
+const MIN_LEARNED_NIGHTS: usize = 6;
+/// An innovation is judged once so many are known, of the group or of its peers. Student's t takes account of how few they are.
+const MIN_KNOWN_NIGHTS: usize = 2;
+/// An innovation moves the estimates by at most so many times the spread.
+pub(super) const MAX_SPREADS: f64 = 4.0;
+/// The least standard error relative to reference or reading, for engines that state none. It is far below any tolerance.
+const MIN_RELATIVE_ERROR: f64 = 1e-6;
+/// The least spread of a group's innovations, in standard errors, for engines that repeat exactly.
+pub(super) const MIN_SPREAD: f64 = 0.1;
+/// The spread of all comparisons of a case counts for at most so many nights in that of each.
+const MAX_PEER_NIGHTS: usize = 50;
+/// What the stated errors and the scatter among meters let expect of a group's spread counts for so many nights.
+const STATED_NIGHTS: usize = 10;
+/// The largest sample of a distribution.
+const MAX_SAMPLE: usize = 2048;
+/// A scatter among meters below this part of the stated errors does not show their distribution.
+const MIN_SCATTER: f64 = 0.5;
+/// A group's own nights show heavy tails once there are so many.
+const MIN_OWN_SAMPLE: usize = 20;
+/// Tails are heavier than normal ones where the largest innovation is so much farther out than that of normal noise, in spreads.
+const HEAVIER: f64 = 0.8;
+/// Beyond the largest innovation so far probabilities fall with this power of the distance, as those of heavy tails do.
+const TAIL_POWER: i32 = 3;
+/// A standard error more than so many times the usual counts as stated. A smaller excess may be chance of few blocks.
+const UNUSUAL_ERROR_RATIO: f64 = 2.0;
+
+/// A night's deviation less the predicted one, in standard errors of the difference.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Innovation(pub(super) f64);
+
+impl Innovation {
+    /// The innovation of a group: the sum over the square root of its number; `None` of an empty group.
+    pub(super) fn of_group(members: impl Iterator<Item = Self>) -> Option<Self> {
+        let (mut sum, mut count) = (0.0, 0.0_f64);
+        for Self(innovation) in members {
+            sum += innovation;
+            count += 1.0;
+        }
+        (count > 0.0).then(|| Self(sum / count.sqrt()))
+    }
+}
+
+/// The spread of innovations; single outliers do not widen it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Spread {
+    squares: f64,
+    pub(super) count: usize,
+}
+
+impl Spread {
+    /// A spread of so many earlier innovations, given by the sum of their squares.
+    pub(super) const fn known(squares: f64, count: usize) -> Self {
+        Self { squares, count }
+    }
+
+    fn value(&self) -> f64 {
+        (self.squares / self.count.max(1) as f64).sqrt().max(MIN_SPREAD)
+    }
+
+    /// The most that an innovation may move an estimate by; unlimited until the spread is known.
+    fn max_step(&self) -> f64 {
+        if self.count < MIN_LEARNED_NIGHTS { f64::INFINITY } else { MAX_SPREADS * self.value() }
+    }
+
+    pub(super) fn update(&mut self, Innovation(innovation): Innovation) {
+        self.squares += innovation.clamp(-self.max_step(), self.max_step()).powi(2);
+        self.count += 1;
+    }
+
+    /// This spread combined with that of its peers, as far as they have more innovations.
+    fn moderated_by(mut self, peers: Self) -> Self {
+        let weight = MAX_PEER_NIGHTS.min(peers.count.saturating_sub(self.count));
+        if weight > 0 {
+            self.squares += peers.squares * weight as f64 / peers.count as f64;
+            self.count += weight;
+        }
+        self
+    }
+
+    /// The standard normal deviate that is as likely as an innovation.
+    pub(super) fn deviate(&self, Innovation(innovation): Innovation) -> f64 {
+        normal_deviate(innovation / self.value(), self.count)
+    }
+}
+
+/// The standardised innovations so far in ascending order; of many every second, every fourth and so on.
+///
+/// They show how often a skewed or heavy-tailed noise goes so far, whatever its distribution.
+#[derive(Clone, Debug)]
+struct Sample {
+    sorted: Vec<f64>,
+    count: usize,
+    /// One of so many innovations is in the sample.
+    stride: usize,
+}
+
+impl Default for Sample {
+    fn default() -> Self {
+        Self { sorted: vec![], count: 0, stride: 1 }
+    }
+}
+
+impl Sample {
+    fn insert(&mut self, standardised: f64) {
+        self.count += 1;
+        if !self.count.is_multiple_of(self.stride) {
+            return;
+        }
+        let place = self.sorted.partition_point(|known| *known < standardised);
+        self.sorted.insert(place, standardised);
+        if self.sorted.len() > MAX_SAMPLE {
+            let mut keep = false;
+            self.sorted.retain(|_| {
+                keep = !keep;
+                keep
+            });
+            self.stride *= 2;
+        }
+    }
+
+    /// The largest normal deviate that a standardised innovation may have, by its rank among those before.
+    fn max_deviate(&self, standardised: f64) -> f64 {
+        let (size, count) = (standardised.abs(), self.sorted.len());
+        let rank = if standardised > 0.0 {
+            count - self.sorted.partition_point(|known| *known < standardised)
+        } else {
+            self.sorted.partition_point(|known| *known <= standardised)
+        };
+        let beyond = (self.largest(standardised).max(1.0) / size).min(1.0).powi(TAIL_POWER);
+        let probability = (rank as f64 + 1.0) / (count as f64 + 1.0) * beyond;
+        Normal::standard().inverse_cdf(1.0 - probability.clamp(f64::EPSILON, 0.5))
+    }
+
+    /// The size of the largest innovation with the sign of a number.
+    fn largest(&self, sign: f64) -> f64 {
+        let largest = if sign > 0.0 { self.sorted.last() } else { self.sorted.first() };
+        largest.map_or(0.0, |largest| largest * sign.signum())
+    }
+
+    /// Whether the tail with the sign of a number has shown itself heavier than a normal one.
+    fn is_heavy(&self, sign: f64) -> bool {
+        let of_normal = Normal::standard().inverse_cdf(1.0 - 0.5 / (self.sorted.len() as f64 + 1.0));
+        self.largest(sign).max(1.0) > of_normal + HEAVIER
+    }
+}
+
+/// The noise of innovations: their spread and their distribution.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Noise {
+    spread: Spread,
+    sample: Rc<Sample>,
+    /// Whether members of a group have heavy tails, which their sum then has too.
+    has_heavy_members: bool,
+}
+
+impl Noise {
+    /// The standard normal deviate that is as likely as an innovation; `None` where too little is known.
+    ///
+    /// `peers` is what is known of similar innovations. Their distribution counts instead of the group's own, if they have one.
+    pub(super) fn deviate(&self, peers: Option<&Self>, innovation: Innovation) -> Option<f64> {
+        let spread = peers.map_or(self.spread, |peers| self.spread.moderated_by(peers.spread));
+        if spread.count < MIN_KNOWN_NIGHTS {
+            return None;
+        }
+        let deviate = spread.deviate(innovation);
+        let of_peers = peers.map(|peers| &peers.sample).filter(|sample| sample.count > 0);
+        let is_limited = match of_peers {
+            // With heavy tails the level of a series is certain only after some nights.
+            Some(sample)
+                if self.spread.count < MIN_LEARNED_NIGHTS && (sample.is_heavy(1.0) || sample.is_heavy(-1.0)) =>
+            {
+                return None;
+            }
+            Some(_) => true,
+            None if self.sample.count >= MIN_OWN_SAMPLE && self.sample.is_heavy(innovation.0) => true,
+            None => peers.is_some_and(|peers| peers.has_heavy_members),
+        };
+        if !is_limited {
+            return Some(deviate);
+        }
+        let most = of_peers.unwrap_or(&self.sample).max_deviate(innovation.0 / spread.value());
+        Some(deviate.clamp(-most, most))
+    }
+
+    /// Learns an innovation.
+    pub(super) fn update(&mut self, peers: Option<&Self>, innovation: Innovation) {
+        self.spread.update(innovation);
+        let spread = peers.map_or(self.spread, |peers| self.spread.moderated_by(peers.spread));
+        Rc::make_mut(&mut self.sample).insert(innovation.0 / spread.value());
+    }
+}
+
+/// The mean deviation of a series over the nights of a segment so far, which predicts the next night.
+#[derive(Clone, Copy, Default)]
+pub(super) struct RunningMean {
+    nights: f64,
+    mean: f64,
+    square_of_errors: f64,
+    spread: Spread,
+}
+
+impl RunningMean {
+    /// A night's deviation from the prediction; `None` without a reading, or without an earlier night.
+    pub(super) fn innovation(&self, series: &Series, night: usize) -> Option<Innovation> {
+        let (n, deviation) = (self.nights, series.deviation[night]);
+        let is_predicted = deviation.is_finite() && n > 0.0;
+        is_predicted.then(|| Innovation((deviation - self.mean) * (n / (n + 1.0)).sqrt() / self.error(series, night)))
+    }
+
+    /// The standard error of a night.
+    ///
+    /// It is uncertain itself, so the root mean square of all nights counts, unless tonight's is unusual.
+    fn error(&self, series: &Series, night: usize) -> f64 {
+        let tonight = series.std_error[night];
+        let usual = ((self.square_of_errors + tonight.powi(2)) / (self.nights + 1.0)).sqrt();
+        let error = if tonight > UNUSUAL_ERROR_RATIO * usual { tonight } else { usual };
+        error.max(least_error(series, night))
+    }
+
+    /// Adds a night, and returns its innovation.
+    pub(super) fn update(&mut self, series: &Series, night: usize) -> Option<Innovation> {
+        let deviation = series.deviation[night];
+        if !deviation.is_finite() {
+            return None;
+        }
+        let (innovation, error) = (self.innovation(series, night), self.error(series, night));
+        self.nights += 1.0;
+        self.square_of_errors += series.std_error[night].powi(2);
+        match innovation {
+            None => self.mean = deviation,
+            Some(innovation) => {
+                let most = self.spread.max_step() * error;
+                self.mean += (deviation - self.mean).clamp(-most, most) / self.nights;
+                self.spread.update(innovation);
+            }
+        }
+        innovation
+    }
+}
+
+/// The least standard error of a reading, for engines that state none: a part of the reference or of the reading.
+///
+/// A reference of zero alone would make every deviation infinite.
+pub(super) fn least_error(series: &Series, night: usize) -> f64 {
+    let reference = series.reference[night];
+    let size = reference.abs().max((reference + series.deviation[night]).abs());
+    (MIN_RELATIVE_ERROR * size).max(f64::MIN_POSITIVE)
+}
+
+/// The noise of all comparisons of a case together before each night.
+pub(super) fn noise_of_comparisons(members: &[&Series], nights: usize) -> Vec<Noise> {
+    let mut means = vec![RunningMean::default(); members.len()];
+    let mut spreads = vec![Spread::default(); members.len()];
+    let (mut noise, mut sample) = (Noise::default(), Sample::default());
+    let mut before = vec![];
+    for night in 0..nights {
+        before.push(noise.clone());
+        let updates = members.iter().zip(&mut means).map(|(series, mean)| mean.update(series, night));
+        let innovations: Vec<Option<Innovation>> = updates.collect();
+        innovations.iter().flatten().for_each(|innovation| noise.spread.update(*innovation));
+        for (innovation, spread) in innovations.iter().zip(&mut spreads) {
+            if let Some(innovation) = innovation {
+                spread.update(*innovation);
+                sample.insert(innovation.0 / spread.moderated_by(noise.spread).value());
+            }
+        }
+        // A copy for each night would be large, and a tenth more innovations change little.
+        if 10 * sample.count > 11 * noise.sample.count {
+            noise.sample = Rc::new(sample.clone());
+        }
+    }
+    before
+}
+
+/// What the stated errors of a group's members and the scatter among them let expect of its noise before each night.
+///
+/// Of a variance of 1, in stated errors, the scatter among members shows one part. The rest, where it is certain, is noise that the
+/// members share: it does not average out. Of a single member, or without stated errors, nothing is expected.
+pub(super) fn expected_noise(members: &[&Series], nights: usize) -> Vec<Noise> {
+    let mut means = vec![RunningMean::default(); members.len()];
+    let (mut squares, mut freedom, mut sample) = (0.0, 0.0_f64, Sample::default());
+    let mut before = vec![];
+    for night in 0..nights {
+        let has_heavy_members = sample.is_heavy(1.0) || sample.is_heavy(-1.0);
+        let mut noise = Noise { has_heavy_members, ..Noise::default() };
+        if freedom > 0.0 {
+            let scatter = squares / freedom;
+            let shared = (1.0 - scatter * (1.0 + 2.0 * (2.0 / freedom).sqrt())).max(0.0);
+            let expected = scatter + members.len() as f64 * shared;
+            noise.spread = Spread::known(expected * STATED_NIGHTS as f64, STATED_NIGHTS);
+        }
+        before.push(noise);
+        let stated = members.iter().zip(&mut means).filter(|(series, _)| series.std_error[night] > 0.0);
+        let updates: Vec<f64> = stated.filter_map(|(series, mean)| Some(mean.update(series, night)?.0)).collect();
+        if updates.len() > 1 {
+            let mean = updates.iter().sum::<f64>() / updates.len() as f64;
+            squares += updates.iter().map(|innovation| (innovation - mean).powi(2)).sum::<f64>();
+            freedom += updates.len() as f64 - 1.0;
+            // Where most noise is shared, the rest does not show a distribution.
+            let spread = Spread::known(squares, freedom as usize).value().max(MIN_SCATTER);
+            for innovation in updates {
+                sample.insert((innovation - mean) / spread);
+            }
+        }
+    }
+    before
+}
+
+/// The standard normal deviate that is as likely as Student's t (Wallace's approximation).
+fn normal_deviate(t: f64, degrees_of_freedom: usize) -> f64 {
+    let n = degrees_of_freedom as f64;
+    (8.0 * n + 1.0) / (8.0 * n + 3.0) * (n * (t * t / n.max(1.0)).ln_1p()).sqrt() * t.signum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_deviate_is_as_likely_as_students_t() {
+        // Two-sided 5 %, 1 % and 0.1 % points of t.
+        for (t, n, u) in [(2.571, 5, 1.960), (3.169, 10, 2.576), (3.659, 29, 3.291)] {
+            assert!((normal_deviate(t, n) - u).abs() < 0.02, "{t} {n}: {}", normal_deviate(t, n));
+            assert_eq!(normal_deviate(-t, n), -normal_deviate(t, n));
+        }
+    }
+
+    #[test]
+    fn peers_count_for_fifty_nights_and_not_where_they_know_no_more() {
+        let moderated = Spread::known(40.0, 10).moderated_by(Spread::known(1000.0, 1000));
+        assert_eq!((moderated.squares, moderated.count), (90.0, 60));
+        let unchanged = Spread::known(40.0, 10).moderated_by(Spread::known(40.0, 10));
+        assert_eq!((unchanged.squares, unchanged.count), (40.0, 10));
+    }
+}

@@ -1,0 +1,97 @@
+//! Limits that give a false alarm every so many nights.
+
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
+
+/// Half the shift that the sums are designed for, in standard errors.
+pub(super) const REFERENCE_VALUE: f64 = 1.0;
+/// Nights of the moving sum.
+pub(super) const WINDOW_NIGHTS: usize = 5;
+/// The share of the false alarms for the moving sum; the cumulative sums and single nights have the rest.
+const SHARE_OF_WINDOW: f64 = 0.75;
+/// The share of the false alarms for single nights.
+const SHARE_OF_NIGHTS: f64 = 0.05;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// The limit of either cumulative sum.
+    pub(super) sum: f64,
+    /// The limit of the moving sum over the square root of its number of nights, on either side.
+    window: f64,
+    /// The limit of one night on either side.
+    pub(super) night: f64,
+}
+
+impl Limits {
+    /// Limits that give a group one false alarm in so many nights.
+    pub(super) fn for_nights(nights: f64) -> Self {
+        Self {
+            sum: root(|limit| nights_of_sums(limit) - nights / (1.0 - SHARE_OF_WINDOW - SHARE_OF_NIGHTS)),
+            window: root(|limit| nights_of_window(limit) - nights / SHARE_OF_WINDOW),
+            night: root(|limit| 0.5 / Normal::standard().sf(limit) - nights / SHARE_OF_NIGHTS),
+        }
+    }
+
+    /// Whether the moving sum of the last nights exceeds its limit.
+    pub(super) fn are_exceeded_by(self, last: impl ExactSizeIterator<Item = f64>) -> bool {
+        last.len() == WINDOW_NIGHTS && last.sum::<f64>().abs() > self.window * (WINDOW_NIGHTS as f64).sqrt()
+    }
+}
+
+/// Nights between alarms of both cumulative sums together (Siegmund, Sequential Analysis (1985), section 2.6).
+fn nights_of_sums(limit: f64) -> f64 {
+    // For one sum; both together alarm twice as often. 1.166 is the overshoot of normal steps.
+    let b = 2.0 * REFERENCE_VALUE * (limit + 1.166);
+    (b.exp() - 1.0 - b) / (2.0 * REFERENCE_VALUE * REFERENCE_VALUE) / 2.0
+}
+
+/// Nights between alarms of a moving sum on either side.
+///
+/// After Siegmund and Venkatraman (Using the generalized likelihood ratio statistic for sequential detection of a change-point, Ann.
+/// Statist. 23 (1995)), with a fixed window.
+fn nights_of_window(limit: f64) -> f64 {
+    let normal = Normal::standard();
+    let y = limit * (2.0 / WINDOW_NIGHTS as f64).sqrt();
+    // The overshoot of the discrete steps, in its closed approximation.
+    let nu = 2.0 / y * (normal.cdf(0.5 * y) - 0.5) / (0.5 * y * normal.cdf(0.5 * y) + normal.pdf(0.5 * y));
+    1.0 / (2.0 * normal.pdf(limit) * limit / WINDOW_NIGHTS as f64 * nu)
+}
+
+/// The zero of a function that grows with its argument, by bisection.
+fn root(function: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.5, 40.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if function(middle) < 0.0 { low = middle } else { high = middle }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_alarm_as_often_as_the_tables_say() {
+        // Two sums with reference value 1 and limit 2.52: 370 steps between false alarms (Hawkins and Olwell 1998, table 3.1).
+        let limit = root(|limit| nights_of_sums(limit) - 370.4);
+        assert!((limit - 2.52).abs() < 0.05, "{limit}");
+    }
+
+    #[test]
+    fn the_last_nights_alarm_as_often_as_white_noise_shows() {
+        let limits = Limits::for_nights(200.0);
+        let mut random = fastrand::Rng::with_seed(1);
+        let (mut alarms, nights) = (0, 400_000);
+        let mut last = std::collections::VecDeque::new();
+        for _ in 0..nights {
+            last.push_back(luxproof_process::random::normal(&mut random));
+            last.drain(..last.len().saturating_sub(WINDOW_NIGHTS));
+            if limits.are_exceeded_by(last.iter().copied()) {
+                alarms += 1;
+                last.clear();
+            }
+        }
+        let ratio = f64::from(nights) * SHARE_OF_WINDOW / 200.0 / f64::from(alarms);
+        assert!((ratio - 1.0).abs() < 0.12, "{ratio}");
+    }
+}

@@ -1,0 +1,88 @@
+//! Kinds of wrong read-outs: powers, thresholds, and steps that all readings are multiples of.
+
+use super::engine_readings::EngineReadings;
+use super::fault::{Fault, Parameter};
+use super::faulty_task::{Readout, Rounding};
+
+/// The fewest different readings that show a common step.
+const MIN_VALUES: usize = 4;
+/// How near to a multiple of a step a reading is, as a part of the step.
+const MAX_STEP_ERROR: f64 = 0.02;
+/// Parts of the smallest reading, or of the smallest difference, that are tried as a step.
+const MAX_PARTS: u32 = 8;
+/// A step below this part of the smallest reading does not show.
+const MIN_STEP_SHARE: f64 = 5e-3;
+
+/// Lists the kinds of read-outs that need no reading.
+pub(super) fn readout_kinds() -> Vec<Fault> {
+    let power = Fault::new("readout", "readings are raised to the power of {0}, each as a part of {1}", |faulty, p| {
+        faulty.readouts.push(Readout::Power { exponent: p[0], level: p[1] });
+        true
+    });
+    let level = |starts: &[f64]| Parameter {
+        unit: " lx",
+        starts: starts.to_vec(),
+        step: 1e-3,
+        range: (0.0, 1e9),
+        period: None,
+    };
+    let at_least = Fault::new("readout", "readings are {0} at least", |faulty, p| {
+        faulty.readouts.push(Readout::AtLeast(p[0]));
+        true
+    });
+    let subtracted = Fault::new("readout", "{0} are subtracted from every reading", |faulty, p| {
+        faulty.readouts.push(Readout::Plus(-p[0]));
+        true
+    });
+    vec![
+        // At a power of 1 the level has no effect, and at none does a fit begin at the brightest reading.
+        power.about("power of readings").with_parameters([
+            Parameter { starts: vec![0.45, 0.9, 1.1, 2.2], ..Parameter::new("", 1.0, 0.02, (0.1, 10.0)) },
+            Parameter { step: 0.1, ..level(&[]) },
+        ]),
+        at_least.about("least reading").with_parameters([level(&[0.1, 1.0, 10.0, 100.0])]),
+        subtracted.about("offset").with_parameters([level(&[0.0])]),
+    ]
+}
+
+/// Faults in which all readings are multiples of one step, where those of the sheets are.
+pub(super) fn step_faults(sheets: &[EngineReadings]) -> Vec<Fault> {
+    let Some(step) = sheets.iter().filter(|sheet| sheet.fails).find_map(find_step) else { return vec![] };
+    let mut all = vec![];
+    for (rounding, how) in [(Rounding::Nearest, "rounded to"), (Rounding::Down, "cut to"), (Rounding::Up, "raised to")]
+    {
+        let what = format!("readings are {how} multiples of {step:.4} lx");
+        all.push(Fault::new("readout", what, move |faulty, _| {
+            faulty.readouts.push(Readout::Step(step, rounding));
+            true
+        }));
+    }
+    all
+}
+
+/// Finds the largest step that all readings of a sheet are multiples of.
+fn find_step(sheet: &EngineReadings) -> Option<f64> {
+    let mut values: Vec<f64> = sheet.read.iter().copied().filter(|read| *read > 0.0).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup_by(|a, b| (*a - *b).abs() < 1e-4 * *b);
+    if values.len() < MIN_VALUES {
+        return None;
+    }
+    let differences = values.windows(2).map(|pair| pair[1] - pair[0]);
+    let smallest = differences.fold(values[0], f64::min);
+    let mut steps = (1..=MAX_PARTS).map(|parts| smallest / f64::from(parts));
+    steps.find_map(|step| Some(refine_step(&values, step)).filter(|step| is_common_step(&values, *step)))
+}
+
+/// Refines a step by each reading in turn, the smallest first.
+fn refine_step(values: &[f64], step: f64) -> f64 {
+    values.iter().fold(step, |step, value| {
+        let count = (value / step).round();
+        if count >= 1.0 && (value / step - count).abs() < 0.25 { value / count } else { step }
+    })
+}
+
+fn is_common_step(values: &[f64], step: f64) -> bool {
+    let is_multiple = |value: &f64| (value / step - (value / step).round()).abs() < MAX_STEP_ERROR;
+    step > MIN_STEP_SHARE * values[0] && values.iter().all(is_multiple)
+}

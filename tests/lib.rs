@@ -1,0 +1,1 @@
+//! Nothing: this package holds tests and benchmarks that use several physics crates.
