@@ -179,13 +179,14 @@ fn is_image(body: &Obstacle, other: &Obstacle, motion: &Motion, near_m: f64) -> 
 }
 
 /// Whether the light of luminaire `b` is the image of that of luminaire `a`, and likewise its opening.
+///
+/// Looks at the directions of the table of `a` alone: every luminaire is `a` once, so that no node of any table is missed.
 fn is_same_light(a: &Luminaire, b: &Luminaire, matrix: DMat3) -> bool {
     let allowed_cd = MAX_INTENSITY_DIFFERENCE * (a.photometry.distribution.max_intensity().value() * a.flux_scale);
     let turn = b.orientation.transpose() * matrix * a.orientation;
     a.model == b.model
         && (a.model == LuminaireModel::Point || is_same_opening(&a.photometry.opening, &b.photometry.opening, turn))
         && has_same_intensities(a, b, matrix, allowed_cd)
-        && has_same_intensities(b, a, matrix.transpose(), allowed_cd)
 }
 
 /// Whether `b` emits as much as `a` in the image of each direction of the table of `a`.

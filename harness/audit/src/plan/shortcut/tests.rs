@@ -128,6 +128,9 @@ fn bodies_and_several_lamps_in_symmetric_places_keep_the_symmetry() {
     twin.position_m.x = 4.5;
     job.scene.luminaires.push(twin);
     assert_eq!(holds(&job).job.sensors.len(), 4);
+    // What a body reflects is a part of its likeness.
+    job.scene.obstacles[1].reflectance = 0.2;
+    assert_eq!(Shortcut::of(&job).job.sensors.len(), 8);
 }
 
 #[test]
@@ -146,6 +149,51 @@ fn meters_without_direct_light_are_zero_without_a_ray() {
     let mut back = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
     back.sensors = fixtures::sensors(&grid(DVec3::new(6.0, 4.0, 3.0), 0.8), DVec3::NEG_Z);
     assert!(holds(&back).job.sensors.is_empty());
+}
+
+/// A table of type B that shines in a narrow band of vertical angles, at every horizontal angle or at few.
+fn narrow_type_b(vertical_deg: [i32; 4], horizontal: &str) -> luxproof_photometry::LuminousIntensityDistribution {
+    let vertical = vertical_deg.map(|v| v.to_string()).join(" ");
+    let rows = if horizontal == "narrow" { ["0", "0", "300", "0", "0"] } else { ["300"; 5] };
+    let rows = rows.map(|cd| format!("0 {cd} {cd} 0")).join("\n");
+    let text =
+        format!("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 4 5 2 2 0 0 0\n1 1 0\n{vertical}\n-90 -20 0 20 90\n{rows}\n");
+    luxproof_photometry::lm63::parse(text.as_bytes()).unwrap().distribution
+}
+
+#[test]
+fn a_meter_that_a_narrow_flood_of_type_b_lights_is_not_dark() {
+    let mut lit = 0;
+    for vertical_deg in [[-90, -70, -40, 0], [-10, 0, 20, 40], [20, 50, 70, 90]] {
+        for (horizontal, tilt_deg) in [("wide", 0.0), ("wide", 70.0), ("narrow", 0.0), ("narrow", -40.0)] {
+            let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+            job.scene.luminaires[0].photometry = fixtures::photometry(narrow_type_b(vertical_deg, horizontal));
+            job.scene.luminaires[0].orientation = orientation(25.0, tilt_deg, 0.0);
+            let lamp = &job.scene.luminaires[0];
+            let fill = Shortcut::of(&job).fill;
+            for (sensor, fill) in job.sensors.iter().zip(&fill) {
+                let to_meter = sensor.meter.position_m - lamp.position_m;
+                if lamp.intensity_towards(to_meter.normalize()).value() > 0.0 && to_meter.dot(sensor.meter.normal) < 0.0 {
+                    lit += 1;
+                    assert_ne!(*fill, Fill::Dark, "{vertical_deg:?} {horizontal} {tilt_deg}: {}", sensor.id);
+                }
+            }
+        }
+    }
+    assert!(lit >= 30, "{lit}");
+}
+
+#[test]
+fn a_meter_close_above_an_uplight_is_lit_though_no_corner_lights_it() {
+    let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+    let table = luxproof_photometry::LuminousIntensityDistribution::axial(vec![0.0, 119.0, 120.0, 180.0], vec![
+        0.0, 0.0, 500.0, 500.0,
+    ]);
+    let lamp = fixtures::luminaire("panel", DVec3::new(3.0, 2.0, 1.0), table.unwrap());
+    job.scene.luminaires = vec![fixtures::with_opening(lamp, LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 })];
+    // The middle sees it straight above, the corners at 97 degrees, where the table is dark.
+    job.sensors = fixtures::sensors(&[[3.0, 2.0, 1.05]], DVec3::NEG_Z);
+    assert_eq!(Shortcut::of(&job).fill, [Fill::Rendered(0)]);
 }
 
 #[test]
@@ -188,4 +236,24 @@ fn a_job_that_differs_in_flux_alone_is_rescaled_and_an_equal_one_is_rendered_onc
         assert!((c.value / w.value - 1.0).abs() < 1e-5, "{c:?} {w:?}");
     }
     assert_eq!(other.omissions.len(), 1);
+}
+
+#[test]
+fn of_two_luminaires_both_must_be_dimmed_alike() {
+    let engines = luxproof_engines::all();
+    let radiance = engines.iter().find(|e| e.name() == "radiance").unwrap();
+    let mut planned_jobs = PlannedJobs::default();
+    let factors = [(2.0, 1.0), (0.6, 0.3), (0.6, 1.0)].map(|(first, second)| {
+        let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), CONVERGED);
+        let mut twin = job.scene.luminaires[0].clone();
+        twin.position_m.x = 1.0;
+        job.scene.luminaires.push(twin);
+        (job.scene.luminaires[0].flux_scale, job.scene.luminaires[1].flux_scale) = (first, second);
+        job.case = format!("{first} {second}");
+        let mut shortcut = Shortcut::of(&job);
+        let before = shortcut.omissions.len();
+        planned_jobs.shorten(&mut shortcut, radiance.as_ref());
+        (shortcut.factor, shortcut.omissions.len() - before)
+    });
+    assert_eq!(factors, [(1.0, 0), (0.3, 1), (1.0, 0)]);
 }
