@@ -38,6 +38,8 @@ const WIDE: f64 = 0.5;
 const BEFORE_A_SURFACE_M: f64 = 0.05;
 /// Meters times luminaires, or triangles times luminaires, that are looked at.
 const MAX_LOOKS: usize = 1_000_000;
+/// The part of the whole sphere that a body fills around a point inside it, but for gaps of rounded corners.
+const CLOSED_PART: f64 = 0.999;
 /// How far from its centre an opening may reach, in metres; beyond that it is asked for light as if it were a point.
 const OPENING_M: f64 = 2.0;
 
@@ -88,7 +90,8 @@ fn of_case(case: &Case) -> Vec<SpecLint> {
     found.extend(large_factors(case));
     found.extend(near_points(case));
     found.extend(idle_faces(case));
-    found.extend(enclosed(case));
+    found.extend(enclosed_luminaires(case));
+    found.extend(enclosed_meters(case));
     found.extend(wide_tolerances(case));
     found.extend(facing_out(case));
     found.extend(case.tasks().filter_map(|task| dark(case, &task)));
@@ -195,7 +198,7 @@ fn idle_faces(case: &Case) -> Option<SpecLint> {
 }
 
 /// Luminaires inside opaque bodies, which no light leaves.
-fn enclosed(case: &Case) -> Vec<SpecLint> {
+fn enclosed_luminaires(case: &Case) -> Vec<SpecLint> {
     let scene = &case.scene;
     let faults = scene.luminaires.iter().enumerate().filter_map(|(k, luminaire)| {
         let body =
@@ -207,15 +210,46 @@ fn enclosed(case: &Case) -> Vec<SpecLint> {
     faults.collect()
 }
 
-fn is_inside(shape: &Shape, point: DVec3, luminaires: usize) -> bool {
+/// Meters inside closed meshes, which no light enters. Those inside boxes are refused.
+fn enclosed_meters(case: &Case) -> Vec<SpecLint> {
+    let meshes: Vec<(usize, &Shape, [DVec3; 2])> =
+        case.scene.obstacles.iter().enumerate().filter_map(|(k, o)| Some((k, &o.shape, mesh_bounds_m(&o.shape)?))).collect();
+    let faults = case.meters.iter().filter_map(|(name, meters)| {
+        let mut found: Vec<(usize, usize)> = vec![];
+        for (k, meter) in meters.iter().enumerate() {
+            let at_m = meter.position_m;
+            let mut near = meshes.iter().filter(|(.., [low, high])| at_m.cmpgt(*low).all() && at_m.cmplt(*high).all());
+            found.extend(near.find(|(_, shape, _)| is_inside(shape, at_m, meters.len())).map(|(body, ..)| (k, *body)));
+        }
+        let (first, body) = *found.first()?;
+        let others = match found.len() - 1 {
+            0 => String::new(),
+            more => format!(" (and {more} more of {})", meters.len()),
+        };
+        let message = format!("{name}[{first}] lies inside obstacles[{body}], which no light enters{others}");
+        Some(SpecLint::new(format!("meters.{name}"), message, "move the points out of the body, or leave them out"))
+    });
+    faults.collect()
+}
+
+/// The corners of the box around a mesh; nothing for a box.
+fn mesh_bounds_m(shape: &Shape) -> Option<[DVec3; 2]> {
+    let Shape::Mesh { vertices_m, .. } = shape else { return None };
+    let low = vertices_m.iter().copied().reduce(DVec3::min)?;
+    let high = vertices_m.iter().copied().reduce(DVec3::max)?;
+    Some([low, high])
+}
+
+/// Whether a point lies inside a body; not looked at where so many points would ask a mesh too often.
+fn is_inside(shape: &Shape, point: DVec3, points: usize) -> bool {
     match shape {
         Shape::Box { min_m, max_m } => point.cmpgt(*min_m).all() && point.cmplt(*max_m).all(),
-        Shape::Mesh { triangles, .. } if triangles.len().saturating_mul(luminaires) > MAX_LOOKS => false,
+        Shape::Mesh { triangles, .. } if triangles.len().saturating_mul(points) > MAX_LOOKS => false,
         Shape::Mesh { vertices_m, triangles } => {
             let corners = triangles.iter().map(|t| t.map(|k| vertices_m[k as usize] - point));
-            // All around there is a body where its faces fill the whole sphere; what looks inwards is a room of its own, as imported scenes
-            // have it.
-            corners.map(solid_angle_sr).sum::<f64>() > 2.0 * PI
+            // Inside a closed body its faces fill the whole sphere. An open one, a lampshade say, leaves a part of it. What faces
+            // inwards is a room of its own, as imported scenes have it.
+            corners.map(solid_angle_sr).sum::<f64>() > CLOSED_PART * 4.0 * PI
         }
     }
 }
