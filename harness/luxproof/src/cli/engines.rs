@@ -49,9 +49,9 @@ pub(super) enum EnginesAction {
         /// Also examine the engines and adapters of this spec
         #[arg(long, value_name = "FILE")]
         spec: Option<PathBuf>,
-        /// Examine a program: its protocol, units, orientation, noise and claims
-        #[arg(long, value_name = "CMD", num_args = 1.., allow_hyphen_values = true, conflicts_with_all = ["names", "spec"])]
-        adapter: Vec<String>,
+        /// Examine a program, with its arguments in quotes: its protocol, units, orientation, noise and claims
+        #[arg(long, value_name = "CMD", conflicts_with = "spec")]
+        adapter: Option<String>,
         /// Folder of scenes, values and logs [default: they are removed]
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
@@ -101,15 +101,25 @@ pub(super) fn manage_engines(
             let folder = tempfile::tempdir().into_diagnostic()?;
             let options = super::audit_options(site.clone(), out.clone().unwrap_or_else(|| folder.path().to_owned()));
             let mut options = Options { skipping: Skipping::Nothing, trust, policy, ..options };
-            options.selection.engines = names;
-            let (report, exit) = match &adapter[..] {
-                [] => examine(spec.as_deref(), &options)?,
-                _ if trust == Trust::Stranger => {
+            let (report, exit) = match adapter {
+                None => {
+                    options.selection.engines = names;
+                    examine(spec.as_deref(), &options)?
+                }
+                Some(_) if trust == Trust::Stranger => {
                     return Err(miette::miette!(
                         "--adapter starts a program, and --untrusted or LUXPROOF_UNTRUSTED starts none"
                     ));
                 }
-                words => examine_adapter(words, options)?,
+                Some(command) if !names.is_empty() => {
+                    let whole = [&[command][..], &names].concat().join(" ");
+                    return Err(miette::miette!(
+                        help = format!("write the command and its arguments in quotes: --adapter \"{whole}\""),
+                        "--adapter takes one program, and `{}` stands beside it",
+                        names.join(" ")
+                    ));
+                }
+                Some(command) => examine_adapter(&command, options)?,
             };
             // Logs that were named stay where they are.
             if out.is_none() && report.engines.iter().any(|e| e.status == Status::Failed) {
@@ -143,11 +153,11 @@ fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<(Report, Exit),
     Ok((report, exit))
 }
 
-fn examine_adapter(words: &[String], options: Options<'_>) -> Result<(Report, Exit), Diagnostic> {
-    let command = match words {
-        // A command as it is typed.
-        [line] if !Path::new(line).is_file() => shlex::split(line).filter(|words| !words.is_empty()),
-        words => Some(words.to_vec()),
+fn examine_adapter(command: &str, options: Options<'_>) -> Result<(Report, Exit), Diagnostic> {
+    let command = if Path::new(command).is_file() {
+        Some(vec![command.to_owned()])
+    } else {
+        shlex::split(command).filter(|words| !words.is_empty())
     };
     let command = command.ok_or_else(|| miette::miette!("--adapter must be a program and its arguments"))?;
     let folder = std::env::current_dir().into_diagnostic()?;
