@@ -275,6 +275,7 @@ impl<'a> Builder<'a> {
         let (luminaire_models, idle_faces) = self.place(&spec.luminaires, hung, &mut scene, listed_obstacles, &meters);
         let seen = meters.values().map(Vec::len).sum::<usize>().saturating_mul(count.saturating_mul(count));
         self.take("luminaires", "pairs of luminaires as meters see them", seen, |left| &mut left.sights);
+        requests::resolve_arrays(&mut spec);
         self.procedures(&spec);
         self.limit_angles(&mut spec, &scene);
         let reflectances = self.surfaces(&spec, &scene, &meters);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 
 use super::super::model::{Budget, LuminaireSpec, Spec, ToleranceOverride};
 use super::{Builder, MAX_METERS};
-use crate::procedures::{AngleLists, Angles, AtAngles, Names, ProcedureRequest};
+use crate::procedures::{AngleLists, Angles, AtAngles, AtOpening, Names, ProcedureRequest};
 use crate::{PlacePart, suggestion};
 use luxproof_model::ProcedureId;
 use luxproof_scene::Scene;
@@ -14,6 +14,20 @@ fn ids_of(spec: &LuminaireSpec) -> Vec<String> {
     let ids: Vec<String> =
         if spec.count() > MAX_METERS { vec![] } else { spec.each().into_iter().map(|(id, _)| id).collect() };
     if ids.is_empty() { vec![spec.id.clone()] } else { ids }
+}
+
+/// Lets a procedure of one luminaire name an array by its id: it is of the first, since all of an array are alike.
+pub(super) fn resolve_arrays(spec: &mut Spec) {
+    for asked in spec.procedures.0.values_mut() {
+        let (ProcedureRequest::Angles(AtAngles { luminaire, .. })
+        | ProcedureRequest::Opening(AtOpening { luminaire, .. })) = asked
+        else {
+            continue;
+        };
+        if spec.luminaires.iter().any(|l| l.id == *luminaire && l.array.is_some()) {
+            luminaire.push_str("[0,0]");
+        }
+    }
 }
 
 impl Builder<'_> {
@@ -118,5 +132,32 @@ impl Builder<'_> {
             known.insert(procedure, *tolerance);
         }
         known
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::Case;
+    use luxproof_model::ProcedureId;
+
+    #[test]
+    fn an_array_names_its_first_luminaire() {
+        let lamp = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reference/luminaires/isotropic.ies");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("spec.yaml");
+        let spec = format!(
+            "luxproof: 1\nroom: {{size_m: [6, 5, 3], reflectance: {{floor: 0.2, walls: 0.5, ceiling: 0.7}}}}\n\
+             luminaires: [{{id: bay, photometry: {}, array: {{counts: [2, 2], origin_m: [1, 1, 2.5], step_m: [2, 2]}}}}]\n\
+             procedures: {{luminous_intensity: {{luminaire: bay, distance_m: 10, angles: photometry}}}}\n",
+            lamp.display()
+        );
+        std::fs::write(&path, &spec).unwrap();
+        let case = Case::load(&path).unwrap();
+        let task = case.task(ProcedureId::LuminousIntensity).unwrap();
+        assert_eq!(task.scene.luminaires.iter().map(|l| l.id.as_str()).collect::<Vec<_>>(), ["bay[0,0]"]);
+        std::fs::write(&path, spec.replace("luminaire: bay", "luminaire: bax")).unwrap();
+        assert!(Case::load(&path).unwrap_err().to_string().contains("there is no luminaire `bax`"));
     }
 }
