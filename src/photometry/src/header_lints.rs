@@ -26,7 +26,7 @@ const QUOTED: usize = 60;
 
 /// The texts of a header with their lines, and the numbers of the file that they may contradict.
 pub(crate) struct Header<'a> {
-    /// Keyword, text and line; line 0 where the format has none.
+    /// Keyword, text and line.
     pub(crate) texts: Vec<(&'a str, &'a str, usize)>,
     pub(crate) distribution: &'a LuminousIntensityDistribution,
     /// Lumens of all lamps together; `None` for absolute photometry.
@@ -34,7 +34,7 @@ pub(crate) struct Header<'a> {
     pub(crate) watts: Option<f64>,
     /// The numbers of an LM-63 file.
     pub(crate) records: Option<LampNumbers>,
-    /// The line of the numbers on lamps; 0 where the format has none.
+    /// The line of the numbers on lamps.
     pub(crate) lamp_line: usize,
 }
 

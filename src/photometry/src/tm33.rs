@@ -65,13 +65,15 @@ pub(super) fn read(bytes: &[u8], which: Option<&str>, tolerance: Tolerance) -> R
         }
     };
     let keywords = header::read_keywords(root);
+    let lines = header::lines_of(&decoded, keywords.iter().map(|keyword| keyword.at));
+    let texts = keywords.iter().zip(lines).map(|(keyword, line)| (&keyword.key[..], &keyword.text[..], line));
     let header = Header {
-        texts: keywords.iter().map(|(key, text)| (&key[..], &text[..], 0)).collect(),
+        texts: texts.collect(),
         distribution: &light.distribution,
         lamp_lumens: light.lamp_lumens,
         watts: light.input_watts,
         records: None,
-        lamp_line: 0,
+        lamp_line: text.line_of(emitters[0].range().start),
     };
     header_lints::check(&header, &mut lints);
     let photometry = Photometry {
@@ -80,7 +82,7 @@ pub(super) fn read(bytes: &[u8], which: Option<&str>, tolerance: Tolerance) -> R
         lamp_lumens: light.lamp_lumens,
         opening: LuminousOpening::Point,
         input_watts: light.input_watts,
-        keywords,
+        keywords: keywords.into_iter().map(|keyword| (keyword.key, keyword.text)).collect(),
         details: Details::None,
         lints: vec![],
         source: vec![],

@@ -27,14 +27,34 @@ fn split_comment(comment: &str) -> (String, String) {
     }
 }
 
+/// An element of the header.
+pub(super) struct Keyword {
+    pub(super) key: String,
+    pub(super) text: String,
+    /// Where the element begins in the document.
+    pub(super) at: usize,
+}
+
 /// Reads the header as keywords in file order.
-pub(super) fn read_keywords(root: Node) -> Vec<(String, String)> {
+pub(super) fn read_keywords(root: Node) -> Vec<Keyword> {
     let Some(header) = child(root, "Header") else { return vec![] };
     header.children().filter(Node::is_element).filter_map(read_keyword).collect()
 }
 
+/// The lines of ascending places of a text, from 1, in one pass over it.
+pub(super) fn lines_of(text: &str, places: impl Iterator<Item = usize>) -> Vec<usize> {
+    let (mut line, mut counted) = (1, 0);
+    let mut lines = vec![];
+    for at in places {
+        line += text.as_bytes()[counted..at].iter().filter(|byte| **byte == b'\n').count();
+        counted = at;
+        lines.push(line);
+    }
+    lines
+}
+
 /// Reads an element of the header as a keyword; `None` where it is empty.
-fn read_keyword(node: Node) -> Option<(String, String)> {
+fn read_keyword(node: Node) -> Option<Keyword> {
     // A character reference such as `&#13;` can put a line end inside a line.
     let value = node.text().unwrap_or_default().trim().replace('\r', " ");
     let value = harmless(&value);
@@ -42,9 +62,11 @@ fn read_keyword(node: Node) -> Option<(String, String)> {
         return None;
     }
     let name = node.tag_name().name();
-    if name == "Comments" {
-        return Some(split_comment(&value));
-    }
-    let keyword = KEYWORDS.iter().find(|(element, _)| *element == name).map(|(_, keyword)| (*keyword).to_string());
-    Some((keyword.unwrap_or_else(|| format!("_{name}")), value.to_string()))
+    let (key, text) = if name == "Comments" {
+        split_comment(&value)
+    } else {
+        let keyword = KEYWORDS.iter().find(|(element, _)| *element == name).map(|(_, keyword)| (*keyword).to_string());
+        (keyword.unwrap_or_else(|| format!("_{name}")), value.to_string())
+    };
+    Some(Keyword { key, text, at: node.range().start })
 }
