@@ -13,6 +13,7 @@ mod calibration;
 mod command_line;
 mod compare;
 mod conformance;
+mod conformance_pack;
 mod contact;
 mod cylindrical;
 mod external_adapter;

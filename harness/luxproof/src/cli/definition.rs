@@ -50,6 +50,7 @@ const GROUPS: [CommandGroup; 4] = [
             ("stress", ENGINES_AND_UNTRUSTED),
             ("bench", ENGINES_AND_UNTRUSTED),
             ("selftest", &["engines_dir", "cache_dir"]),
+            ("conformance", &[]),
         ],
     },
     CommandGroup {
@@ -121,7 +122,7 @@ mod tests {
         let mut program = definition().term_width(80);
         program.build();
         let names = GROUPS.iter().flat_map(|group| group.commands).map(|(name, _)| *name);
-        assert!(program.render_help().to_string().lines().count() <= 48, "the list of 26 commands in four groups");
+        assert!(program.render_help().to_string().lines().count() <= 48, "the list of 27 commands in four groups");
         for name in names {
             let command = program.find_subcommand_mut(name).unwrap();
             let short = command.render_help().to_string();
@@ -142,6 +143,7 @@ mod tests {
                         | "selftest"
                         | "cache"
                         | "schema"
+                        | "conformance"
                         | "completions"
                         | "man"
                 ),

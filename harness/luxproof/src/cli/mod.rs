@@ -36,6 +36,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use luxproof_audit::plan::{Selection, Skipping};
 use luxproof_audit::{Calibration, Options};
+use luxproof_conformance::ConformanceArgs;
 use luxproof_console::{complain, json, print};
 use luxproof_engines::{EngineRoot, ExternalAnswers, ExternalProbe, ExternalRequest};
 use luxproof_model::Sampling;
@@ -94,6 +95,8 @@ enum Command {
     },
     /// Show, check and convert photometric files
     Photometry(PhotometryArgs),
+    /// Write the conformance pack of photometric files, or judge a reader's answers
+    Conformance(ConformanceArgs),
     /// Print a finished run again, in any format
     Report(views::ReportArgs),
     /// Open the report of a run in a browser
@@ -335,6 +338,7 @@ impl Cli {
             Command::Export(args) => export::export(&args, &site, trust),
             Command::Engines { action } => engines::manage_engines(action, &site, trust),
             Command::Photometry(args) => luxproof_photometry_tool::run(&args, trust),
+            Command::Conformance(args) => luxproof_conformance::run(&args, env!("LUXPROOF_VERSION")),
             Command::Report(mut args) => {
                 args.views.all |= self.verbose > 0;
                 match &args.from {
