@@ -80,6 +80,7 @@ fn synthetic(cases: usize, procedures: &[ProcedureId], meters: usize) -> Result<
             policy: None,
             decision_rule: String::new(),
             is_calibration: false,
+            hidden_variant: None,
             has_bodies: false,
             luminaire_models: vec![],
         });

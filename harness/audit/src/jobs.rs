@@ -17,7 +17,7 @@ use luxproof_engines::{CpuUse, EngineError, Job, Measurement};
 use luxproof_model::{
     EngineName, EngineStatus, FailureKind, ProcedureId, Reading, ReadingKey, Recording, StatedErrors, Status,
 };
-use luxproof_model::{Scope, Skip};
+use luxproof_model::{Scope, Skip, SkipCause};
 use luxproof_process::files::{self, FileError};
 use luxproof_process::slots::side_by_side;
 use luxproof_spec::{Case, SHORTEST_PATIENCE, content};
@@ -186,7 +186,8 @@ impl Running<'_> {
         if let Err(Failure { kind: FailureKind::Declined, text: why, .. }) = &taken {
             self.observer.ended(self.case, engine, task.procedure, start.elapsed(), None);
             let reason = format!("it declines: {why}");
-            return RunResult::Declined(skip_of(self.case, task, engine.name(), Scope::Procedure, reason));
+            let skip = skip_of(self.case, task, engine.name(), Scope::Procedure, reason);
+            return RunResult::Declined(skip.because(SkipCause::Unsupported));
         }
         let source = taken.as_ref().ok().map(|taken| taken.source);
         let recording = self.record(run, taken, start.elapsed());

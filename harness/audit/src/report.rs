@@ -37,6 +37,7 @@ pub(crate) fn report_of_case(
             policy: policy.record.clone(),
             decision_rule: policy.tolerances.decision_rule(),
             is_calibration: case.is_calibration(),
+            hidden_variant: case.hidden_variant.clone(),
             has_bodies: case.scene.obstacles.iter().any(|o| !flush::is_plate(o)),
             luminaire_models: case.grouped_models(),
             plan: (!case.is_calibration()).then(|| floor_plan(&case.scene)).flatten(),

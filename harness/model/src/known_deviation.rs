@@ -38,6 +38,9 @@ pub struct KnownDeviation {
     /// Its standard uncertainty, likewise; less than half of the deviation.
     pub uncertainty: f64,
     pub cause: String,
+    /// Whether the cause is a fault of the engine or a limit of its method.
+    #[serde(default, skip_serializing_if = "DeviationKind::is_fault")]
+    pub kind: DeviationKind,
     /// How it is known: a measurement, a manual, a paper.
     pub source: String,
     /// The person who is responsible for it.
@@ -50,6 +53,24 @@ pub struct KnownDeviation {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<String>")]
     pub expires: Option<Day>,
+}
+
+/// The kind of a known deviation's cause.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DeviationKind {
+    /// The engine computes something else than it should.
+    #[default]
+    Fault,
+    /// The engine's method or a setting approximates here.
+    Limit,
+}
+
+impl DeviationKind {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+    fn is_fault(&self) -> bool {
+        *self == Self::Fault
+    }
 }
 
 /// A name in which `*` matches anything and `?` one letter. Brackets are literal, because names of meters have them.

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    BaselineCheck, Bias, Comparison, Consensus, Curve, EngineName, EngineStatus, Exit, FloorPlan,
+    BaselineCheck, Bias, Comparison, Consensus, Curve, EngineName, EngineStatus, Exit, FloorPlan, HiddenVariant,
     KnownDeviationOutcome, LuminaireModelChoice, MeterId, PaperSplit, PolicyRecord, ProcedureId, PublishedTable,
     Ratios, Reading, ReadingKey, Recording, Request, Role, Sentence, Skip, Split, StatedErrors, Statistics, Summary,
     Tool, Verdict,
@@ -107,6 +107,9 @@ pub struct CaseRecord {
     /// Whether it holds calibration scenes, which no spec requests.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_calibration: bool,
+    /// The public case that it is a hidden variant of, with the seed; null for a public case.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hidden_variant: Option<HiddenVariant>,
     /// Whether its room has obstacles.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub has_bodies: bool,

@@ -15,12 +15,40 @@ pub struct Skip {
     pub reason: String,
     /// The saving, where there is one.
     pub saved: Option<String>,
+    /// The kind of reason; `other` in older reports.
+    #[serde(default, skip_serializing_if = "SkipCause::is_other")]
+    pub cause: SkipCause,
+}
+
+/// The kind of a skip's reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SkipCause {
+    /// The engine cannot do such a job.
+    Unsupported,
+    /// The engine is not installed.
+    Absent,
+    #[default]
+    Other,
+}
+
+impl SkipCause {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+    fn is_other(&self) -> bool {
+        *self == Self::Other
+    }
 }
 
 impl Skip {
     /// A skip that saves nothing.
     pub fn new(key: ReadingKey, scope: Scope, reason: impl Into<String>) -> Self {
-        Self { key, scope, reason: reason.into(), saved: None }
+        Self { key, scope, reason: reason.into(), saved: None, cause: SkipCause::Other }
+    }
+
+    /// The skip with the kind of its reason.
+    #[must_use]
+    pub fn because(self, cause: SkipCause) -> Self {
+        Self { cause, ..self }
     }
 
     /// The skip with its saving.

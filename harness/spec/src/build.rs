@@ -21,7 +21,7 @@ use super::tree::tree;
 use super::trust::Limits;
 use super::{Faults, Source, SpecError, Trust};
 use crate::procedures::{Aimed, Procedures, Sets, Task};
-use luxproof_model::{LuminaireModelChoice, ProcedureId, family};
+use luxproof_model::{HiddenVariant, LuminaireModelChoice, ProcedureId, family};
 use luxproof_process::digest::hexadecimal;
 use luxproof_process::printable;
 
@@ -82,6 +82,8 @@ pub struct Case {
     /// The engines that a case of a suite is for, where its overrides name some; others are skipped.
     pub only_engines: Option<Vec<String>>,
     pub budget: Budget,
+    /// The public case that it is a hidden variant of.
+    pub hidden_variant: Option<HiddenVariant>,
     /// The published tables, absolute or relative to the working directory.
     pub published: Option<PathBuf>,
     /// The files that the spec names, and those that they name, each once; the published tables, too.
@@ -297,6 +299,9 @@ impl<'a> Builder<'a> {
         let title = spec.title.as_deref().unwrap_or(&name);
         let help = format!("give a line of at most {MAX_TITLE} printable characters");
         self.check(is_line(title, MAX_TITLE), "title", "this is no title", help);
+        if let Some(variant) = &spec.hidden_variant {
+            self.name("hidden_variant.of", &variant.of);
+        }
         let case = Case {
             before: vec![],
             title: title.to_owned(),
@@ -316,6 +321,7 @@ impl<'a> Builder<'a> {
             recorded,
             only_engines: None,
             budget: spec.budget,
+            hidden_variant: spec.hidden_variant,
             published,
             files: self.files.take(),
             tolerances,

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::length_unit::LengthUnit;
 use crate::procedures::Procedures;
+use luxproof_model::HiddenVariant;
 use luxproof_model::shapes::{ShapedValue, Shapes};
 
 /// The version of a format that this program reads, reported with all other errors of form.
@@ -58,6 +59,9 @@ pub struct Spec {
     /// Overrides of the default tolerances, by procedure.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub tolerances: BTreeMap<String, ToleranceOverride>,
+    /// What the spec was drawn from, where it is a hidden variant of a public case.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hidden_variant: Option<HiddenVariant>,
     /// Overrides that make a suite of the spec, each a case of its own: a list, each with a `name`, or a matrix.
     #[serde(default, skip_serializing)]
     #[schemars(with = "Option<CasesSchema>")]

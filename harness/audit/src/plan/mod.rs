@@ -9,6 +9,7 @@ mod spot_check;
 use luxproof_model::EVERYONE;
 use luxproof_model::Scope;
 use luxproof_model::Skip;
+use luxproof_model::SkipCause;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -215,21 +216,24 @@ impl<'a> Planner<'a> {
             let absence = found.as_ref().and_then(|f| f.as_ref().err()).map(ToString::to_string);
             for (task, offer) in plan.tasks.iter().zip(offers) {
                 if let Some(absent) = &absence {
-                    plan.skips.push(skip_of(case, task, engine.name(), Scope::Engine, absent.clone()));
+                    let skip = skip_of(case, task, engine.name(), Scope::Engine, absent.clone());
+                    plan.skips.push(skip.because(SkipCause::Absent));
                     continue;
                 }
-                let (scope, reason) = match offer {
-                    Offer::Skip(scope, reason) => (scope, reason),
+                let (cause, reason) = match offer {
+                    Offer::Skip(cause, reason) => (cause, reason),
                     // After the version probe an engine may support less.
                     Offer::Run(run) => match engine.supports(&run.job) {
-                        Support::No(reason) => (Scope::Procedure, reason),
+                        Support::No(reason) => (SkipCause::Unsupported, reason),
                         Support::Yes | Support::Approximate { .. } => {
                             plan.runs.push(Run { engine: e, ..*run });
                             continue;
                         }
                     },
                 };
-                plan.skips.push(skip_of(case, task, engine.name(), scope, reason).saving("the whole run"));
+                let scope = if cause == SkipCause::Unsupported { Scope::Procedure } else { Scope::Engine };
+                let skip = skip_of(case, task, engine.name(), scope, reason).because(cause);
+                plan.skips.push(skip.saving("the whole run"));
             }
             plan.engines.push(Planned { engine, found, asked });
         }
@@ -240,7 +244,7 @@ impl<'a> Planner<'a> {
     fn offers(&self, case: &Case, engine: &dyn Engine, tasks: &[Task]) -> Vec<Offer> {
         if is_excluded(case, engine) {
             let reason = "the case is not for this engine";
-            return tasks.iter().map(|_| Offer::Skip(Scope::Engine, reason.into())).collect();
+            return tasks.iter().map(|_| Offer::Skip(SkipCause::Other, reason.into())).collect();
         }
         tasks.iter().enumerate().map(|(t, task)| self.offer(case, engine, t, task)).collect()
     }
@@ -254,7 +258,7 @@ impl<'a> Planner<'a> {
                 let text = size.map(|s| format!(" (about {:.1} %)", 100.0 * s)).unwrap_or_default();
                 (Some(format!("{why}{text}")), size.unwrap_or(0.0))
             }
-            Support::No(reason) => return Offer::Skip(Scope::Procedure, reason),
+            Support::No(reason) => return Offer::Skip(SkipCause::Unsupported, reason),
         };
         let shortcut = Shortcut::none(&job);
         Offer::Run(Box::new(Run { engine: 0, task: t, job, approximation, declared, shortcut, spot_check: vec![] }))
@@ -311,7 +315,7 @@ fn direct_light_skips(case: &Case, tasks: &[Task]) -> Vec<Skip> {
 /// Whether an engine can run a task.
 enum Offer {
     Run(Box<Run>),
-    Skip(Scope, String),
+    Skip(SkipCause, String),
 }
 
 /// The largest cost of a whole job in seconds: its budget, or little for built-in solvers that do not sample.

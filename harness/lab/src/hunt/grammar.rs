@@ -257,6 +257,7 @@ impl SpecGenerator<'_> {
             budget: grammar.budget,
             published: None,
             tolerances: BTreeMap::new(),
+            hidden_variant: None,
             cases: None,
             compare: None,
         };

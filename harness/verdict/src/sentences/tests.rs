@@ -52,6 +52,7 @@ fn sentence_text(comparisons: Vec<Comparison>, bodies: &[&str], bias: Vec<Bias>)
         scope: luxproof_model::Scope::Meter,
         reason: String::new(),
         saved: None,
+        cause: luxproof_model::SkipCause::Unsupported,
     });
     let skips = skips.collect();
     let cases = names.into_iter().map(case).collect();

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::RepeatedReadings;
 use super::group::{Finding, Group, states_sampling_error};
-use luxproof_model::{EngineName, Estimate, FailureKind, Scope, Skip};
+use luxproof_model::{EngineName, Estimate, FailureKind, Scope, Skip, SkipCause};
 use luxproof_statistics::{Agreement, rejected};
 
 /// The probability of any false claim in a whole self-test (Holm).
@@ -117,7 +117,7 @@ impl Honesty {
 /// The skip of a procedure that an engine declines.
 fn make_skip(read: &RepeatedReadings) -> Skip {
     let reason = read.failure.as_ref().map_or(String::new(), |f| format!("it declines: {f}"));
-    Skip { key: read.key.clone(), scope: Scope::Procedure, reason, saved: None }
+    Skip::new(read.key.clone(), Scope::Procedure, reason).because(SkipCause::Unsupported)
 }
 
 #[cfg(test)]
