@@ -10,6 +10,7 @@ pub mod selftest;
 pub mod stress;
 mod tables;
 mod trials;
+pub mod variants;
 
 use itertools::Itertools;
 
