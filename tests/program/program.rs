@@ -10,6 +10,7 @@ mod bundle;
 mod by_hand;
 mod cache;
 mod calibration;
+mod cards;
 mod command_line;
 mod compare;
 mod conformance;

@@ -19,6 +19,7 @@ pub use budget::budgets;
 pub use csv::csv;
 pub use html::table;
 pub use html::{AttachedReport, AttachedReportError, keep as keep_page, page};
+pub use html::{BASE_STYLE, minus};
 pub use junit::junit;
 pub use markdown::markdown;
 pub use terminal::{Detail, Letters, Screen, Style, terminal};

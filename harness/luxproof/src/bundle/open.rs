@@ -22,7 +22,7 @@ use super::{BundleError, LOCK, Lock, RUN, SUMS};
 use luxproof_model::REPORT_FILE;
 use luxproof_model::Report;
 use luxproof_process::digest;
-use luxproof_process::files::{FileError, MAX_KEPT_BYTES, read_bounded};
+use luxproof_process::files::{self, Durability, FileError, MAX_KEPT_BYTES, read_bounded};
 use luxproof_process::printable;
 use luxproof_spec::{BUNDLE_FILE, Trust};
 
@@ -128,6 +128,24 @@ impl Opened {
         }
         let report = luxproof_report_file::read(&stage.path().join(RUN).join(REPORT_FILE))?;
         Ok(Self { lock, report, sha256, files: listed.len() + 1, stage })
+    }
+
+    /// Its report's file, in the copy.
+    pub fn report_file(&self) -> PathBuf {
+        self.stage.path().join(RUN).join(REPORT_FILE)
+    }
+
+    /// Writes it as a zip, whatever it was read from.
+    pub fn write_zip(&self, out: &Path) -> Result<(), BundleError> {
+        let failed = |e: io::Error| FileError::of(out, e);
+        let listed = read_bounded(&self.stage.path().join(SUMS), MAX_TEXT).map_err(failed)?;
+        let sums = String::from_utf8(listed).ok().and_then(|text| sums::parse(&text));
+        let sums = sums.ok_or_else(|| BundleError::NoBundle(out.display().to_string()))?;
+        files::replace_through(out, Durability::Lasting, |file: &mut File| {
+            pack(self.stage.path(), &sums, file).map_err(io::Error::other)
+        })
+        .map_err(failed)?;
+        Ok(())
     }
 
     /// The specs, where they may be run.

@@ -45,6 +45,7 @@ const GROUPS: [CommandGroup; 4] = [
         commands: &[
             ("bundle", UNTRUSTED),
             ("reproduce", ALL),
+            ("cards", ENGINES_AND_UNTRUSTED),
             ("hunt", ENGINES),
             ("shrink", ENGINES),
             ("stress", ENGINES_AND_UNTRUSTED),

@@ -5,6 +5,7 @@ mod bench;
 mod bisect;
 mod bundle;
 mod cache;
+mod cards;
 mod check;
 mod definition;
 pub mod diff;
@@ -36,6 +37,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use luxproof_audit::plan::{Selection, Skipping};
 use luxproof_audit::{Calibration, Options};
+use luxproof_cards::{Capabilities, Cards, CellEvidence};
 use luxproof_conformance::ConformanceArgs;
 use luxproof_console::{complain, json, print};
 use luxproof_engines::{EngineRoot, ExternalAnswers, ExternalProbe, ExternalRequest};
@@ -105,6 +107,8 @@ enum Command {
     Bundle(bundle::BundleArgs),
     /// Repeat a bundle's run, judge printed tables, or explain a study
     Reproduce(reproduce::ReproduceArgs),
+    /// Draw score cards: what each renderer can be trusted for
+    Cards(cards::CardsArgs),
     /// Collect nightly runs, draw trends and detect changes
     #[command(subcommand)]
     History(history::Action),
@@ -140,7 +144,7 @@ enum Command {
     /// Compute one value for another process of this program
     #[command(name = luxproof_audit::measure::READ_ONE, hide = true)]
     ReadOne,
-    /// Print a JSON Schema: spec, policy, report, adapter protocol
+    /// Print a JSON Schema: spec, policy, report, cards, adapter protocol
     Schema {
         /// Which schema
         #[arg(value_enum, default_value_t = SchemaOf::Spec)]
@@ -292,6 +296,12 @@ enum SchemaOf {
     /// `luxproof.yaml`
     Policy,
     Report,
+    /// `cards.json` of a site of score cards
+    Cards,
+    /// The evidence behind a page of score cards
+    CardEvidence,
+    /// Capabilities of score cards
+    Capabilities,
     /// Input of an adapter
     Request,
     /// Answer of an adapter to a probe
@@ -353,6 +363,7 @@ impl Cli {
             Command::Open(args) => open::open(&args),
             Command::Bundle(args) => bundle::bundle(&args, trust),
             Command::Reproduce(args) => reproduce::reproduce(&args, &site, || cache::folder(self.cache_dir), trust),
+            Command::Cards(args) => cards::cards(&args, &site, trust),
             Command::History(action) => history::history(&action),
             Command::Diff(args) => diff::diff(&args),
             Command::Bisect(args) => bisect::run(&args, &site, &cache::folder(self.cache_dir)?, trust),
@@ -392,6 +403,9 @@ fn schema(of: SchemaOf) -> Result<Exit, Diagnostic> {
         SchemaOf::Spec => schemars::schema_for!(Spec),
         SchemaOf::Policy => schemars::schema_for!(ProjectPolicy),
         SchemaOf::Report => schemars::schema_for!(Report),
+        SchemaOf::Cards => schemars::schema_for!(Cards),
+        SchemaOf::CardEvidence => schemars::schema_for!(CellEvidence),
+        SchemaOf::Capabilities => schemars::schema_for!(Capabilities),
         SchemaOf::Request => schemars::schema_for!(ExternalRequest),
         SchemaOf::Probe => schemars::schema_for!(ExternalProbe),
         SchemaOf::Answers => schemars::schema_for!(ExternalAnswers),

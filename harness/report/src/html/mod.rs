@@ -32,7 +32,9 @@ pub use page_files::keep;
 
 pub use attachments::{AttachedReport, AttachedReportError};
 
-const STYLE: &str = include_str!("page.css");
+/// What pages of other views share with the report: colours, type, tables.
+pub const BASE_STYLE: &str = include_str!("base.css");
+const STYLE: &str = concat!(include_str!("base.css"), include_str!("page.css"));
 const SCRIPT: &str = include_str!("page.js");
 /// The browser refuses to load anything.
 const POLICY: &str =
@@ -284,7 +286,7 @@ fn percent(deviation: f64) -> String {
 }
 
 /// Real minus signs before numbers; hyphens within words stay.
-fn minus(text: &str) -> String {
+pub fn minus(text: &str) -> String {
     let mut result = String::with_capacity(text.len());
     let mut letters = text.chars().peekable();
     while let Some(letter) = letters.next() {

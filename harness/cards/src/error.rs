@@ -1,0 +1,29 @@
+//! Why there are no cards.
+
+use luxproof_spec::{Faults, SpecError};
+
+/// Why reports give no cards.
+#[derive(Debug, thiserror::Error)]
+pub enum CardsError {
+    #[error(transparent)]
+    Capabilities(#[from] Faults),
+    #[error(
+        "{run} judges case {case} by the policy {policy}; cards need luxproof's own tolerances: run it again where no policy is found, or \
+         with a tolerance class of `verification`"
+    )]
+    Policy { run: String, case: String, policy: String },
+    #[error(
+        "{run} was judged for the tolerance class {class}; cards need `verification`: run it again without --tolerance-class"
+    )]
+    Class { run: String, class: String },
+    #[error("{run} has no case of a capability; docs/score-cards.md lists the specs that have")]
+    NoCase { run: String },
+    #[error("a file of the site cannot be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+impl From<SpecError> for CardsError {
+    fn from(error: SpecError) -> Self {
+        Self::Capabilities(error.into())
+    }
+}

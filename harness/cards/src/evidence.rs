@@ -1,0 +1,328 @@
+//! The evidence of reports: how an engine did in each case that shows a capability.
+
+use std::collections::{BTreeMap, HashMap};
+
+use itertools::Itertools;
+use luxproof_model::{
+    Basis, CaseRecord, Comparison, DeviationKind, EngineName, FailureKind, HiddenVariant, ProcedureId, ReadingKey,
+    Recording, Report, SkipCause, Verdict,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Capability, Deviation, RunId};
+
+/// The name of the scenes of known answer in capabilities.
+const CALIBRATION: &str = "calibration";
+/// Points of a case that a page lists; the report has all.
+const LISTED_POINTS: usize = 8;
+
+/// How an engine did in one procedure of one case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CaseEvidence {
+    /// The case as capabilities name it: of a hidden variant the public case.
+    pub case: String,
+    /// The name of the case in its report.
+    pub reported_as: String,
+    pub title: String,
+    pub procedure: ProcedureId,
+    /// Null for a public case.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hidden: Option<HiddenVariant>,
+    pub run: RunId,
+    /// The engine's name in its report, such as `mitsuba@3.5.2`.
+    pub engine: EngineName,
+    /// Hash of what was measured, independent of names.
+    pub content_sha256: String,
+    /// The command that repeats the values by hand, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command: Option<String>,
+    pub outcome: Outcome,
+}
+
+/// What came of a case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "outcome", rename_all = "snake_case")]
+pub enum Outcome {
+    Measured(Measurement),
+    /// The engine declined it.
+    Unsupported {
+        reason: String,
+    },
+    /// It was not run, or nothing could be compared.
+    NotRun {
+        reason: String,
+    },
+    /// The engine gave no usable values.
+    Failed {
+        reason: String,
+    },
+}
+
+/// The values of a case against their references.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Measurement {
+    pub verdicts: VerdictCounts,
+    /// The deviation with the largest bound; null where no reference is above zero.
+    pub worst: Option<Deviation>,
+    /// Why it is not accurate; empty if every point passes.
+    pub remarks: Vec<Remark>,
+    /// The points with the largest bounds, at most eight.
+    pub points: Vec<PointEvidence>,
+}
+
+/// The number of comparisons by verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct VerdictCounts {
+    pub all: usize,
+    pub passed: usize,
+    pub failed: usize,
+    pub undecided: usize,
+    pub known: usize,
+    pub not_judged: usize,
+}
+
+/// Why a measurement is not accurate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Remark {
+    /// Something is wrong.
+    Fault {
+        text: String,
+        points: usize,
+        /// The deviation with the largest bound among these points.
+        worst: Option<Deviation>,
+        /// A point with this deviation.
+        at: Option<String>,
+    },
+    /// The method or a setting approximates, or claims nothing here.
+    Limit { text: String, points: usize, worst: Option<Deviation>, at: Option<String> },
+    /// More samples would decide.
+    Undecided { points: usize, worst: Option<Deviation>, at: Option<String> },
+}
+
+/// One comparison.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PointEvidence {
+    pub meter: String,
+    pub value: f64,
+    pub reference: f64,
+    pub unit: String,
+    pub deviation: Deviation,
+    pub verdict: Verdict,
+    /// Formula, solver or paper behind the reference.
+    pub source: String,
+}
+
+/// A report, sorted by what cards look for.
+pub(crate) struct ReportIndex<'a> {
+    report: &'a Report,
+    comparisons: HashMap<&'a ReadingKey, Vec<&'a Comparison>>,
+    recordings: HashMap<&'a ReadingKey, &'a Recording>,
+}
+
+impl<'a> ReportIndex<'a> {
+    pub(crate) fn new(report: &'a Report) -> Self {
+        let comparisons = report.comparisons.iter().map(|c| (&c.key, c)).into_group_map();
+        let recordings = report.recordings.iter().map(|r| (&r.key, r)).collect();
+        Self { report, comparisons, recordings }
+    }
+
+    /// The evidence about an engine for a capability, in the order of the report.
+    pub(crate) fn evidence(&self, capability: &Capability, engine: &EngineName, run: &RunId) -> Vec<CaseEvidence> {
+        let mut found = vec![];
+        for record in &self.report.cases {
+            let case = case_name(record);
+            for procedure in capability.cases.iter().filter(|s| s.case == case).flat_map(|s| &s.procedures) {
+                let key = ReadingKey::new(&record.name, *procedure, engine.clone());
+                let Some(outcome) = self.outcome(&key) else { continue };
+                let recording = self.recordings.get(&key);
+                found.push(CaseEvidence {
+                    case: case.to_owned(),
+                    reported_as: record.name.clone(),
+                    title: record.spec.title.clone(),
+                    procedure: *procedure,
+                    hidden: record.hidden_variant.clone(),
+                    run: run.clone(),
+                    engine: engine.clone(),
+                    content_sha256: recording.map(|r| r.content_sha256.clone()).unwrap_or_default(),
+                    command: recording.and_then(|r| r.command.clone()),
+                    outcome,
+                });
+            }
+        }
+        found
+    }
+
+    /// What came of a job; `None` where the run did not ask for it.
+    fn outcome(&self, key: &ReadingKey) -> Option<Outcome> {
+        let Some(recording) = self.recordings.get(key) else { return self.skipped(key) };
+        if let Some(reason) = &recording.failure {
+            let reason = reason.clone();
+            return Some(match recording.failure_kind {
+                Some(FailureKind::Declined) => Outcome::Unsupported { reason },
+                Some(kind) if !kind.is_an_answer() => Outcome::NotRun { reason },
+                _ => Outcome::Failed { reason },
+            });
+        }
+        let judged = self.comparisons.get(key).into_iter().flatten().copied().filter(|c| is_judge(c));
+        let judged: Vec<&Comparison> = judged.collect();
+        if judged.is_empty() {
+            return Some(Outcome::NotRun { reason: "there is no independent reference".to_owned() });
+        }
+        Some(Outcome::Measured(self.measurement(recording, &judged)))
+    }
+
+    fn skipped(&self, key: &ReadingKey) -> Option<Outcome> {
+        let mut skips = self.report.skips.iter().filter(|s| s.key == *key && s.scope.leaves_no_reading());
+        let skip = skips.next()?;
+        let reason = skip.reason.clone();
+        Some(match skip.cause {
+            SkipCause::Unsupported => Outcome::Unsupported { reason },
+            SkipCause::Absent | SkipCause::Other => Outcome::NotRun { reason },
+        })
+    }
+
+    fn measurement(&self, recording: &Recording, judged: &[&Comparison]) -> Measurement {
+        let mut remarks: BTreeMap<RemarkKey, Vec<&Comparison>> = BTreeMap::new();
+        for c in judged {
+            if let Some(key) = self.remark_key(c) {
+                remarks.entry(key).or_default().push(c);
+            }
+        }
+        let mut remarks: Vec<Remark> = remarks.into_iter().map(|(key, points)| key.remark(&points)).collect();
+        remarks.extend(self.remarks_on_errors(recording, judged));
+        let points = judged.iter().filter_map(|c| PointEvidence::of(c));
+        let points: Vec<PointEvidence> =
+            points.sorted_by(|a, b| b.deviation.bound().total_cmp(&a.deviation.bound())).collect();
+        Measurement {
+            verdicts: VerdictCounts::of(judged),
+            worst: points.first().map(|point| point.deviation),
+            remarks,
+            points: points.into_iter().take(LISTED_POINTS).collect(),
+        }
+    }
+
+    /// Why a comparison is not accurate; `None` if it is.
+    fn remark_key(&self, c: &Comparison) -> Option<RemarkKey> {
+        let cause = c.diagnosis.clone();
+        match c.verdict {
+            // An unexpected pass lies within its tolerance: the record of the deviation is out of date.
+            Verdict::Pass | Verdict::UnexpectedPass => None,
+            Verdict::Undecided => Some(RemarkKey::Undecided),
+            Verdict::NotJudged => {
+                Some(RemarkKey::Limit(cause.unwrap_or_else(|| "its method claims nothing here".to_owned())))
+            }
+            Verdict::KnownDeviation => {
+                let cause = cause.unwrap_or_else(|| "a known deviation".to_owned());
+                Some(if self.is_limit(c) { RemarkKey::Limit(cause) } else { RemarkKey::Fault(cause) })
+            }
+            Verdict::Fail => match self.report.declared(c) {
+                Some(approximation) => Some(RemarkKey::Limit(format!("it declares: {approximation}"))),
+                None => Some(RemarkKey::Fault(cause.unwrap_or_default())),
+            },
+            Verdict::Missing => Some(RemarkKey::Fault("it gave no value".to_owned())),
+        }
+    }
+
+    /// Whether the known deviation behind a verdict is a limit of the method.
+    fn is_limit(&self, c: &Comparison) -> bool {
+        let outcomes = self.report.known_deviations.iter().filter(|known| known.key == c.key);
+        let mut entries = outcomes.map(|known| &known.entry).filter(|entry| {
+            let is_basis = entry.basis.is_none_or(|basis| c.basis() == Some(basis));
+            is_basis && entry.is_at(c) && c.diagnosis.as_deref() == Some(entry.summary().as_str())
+        });
+        entries.next().is_some_and(|entry| entry.kind == DeviationKind::Limit)
+    }
+
+    /// Faults of means and of stated errors, which no single point shows.
+    fn remarks_on_errors(&self, recording: &Recording, judged: &[&Comparison]) -> Vec<Remark> {
+        let mut remarks = vec![];
+        let biases = self.report.bias.iter().filter(|bias| bias.fails && bias.key == recording.key);
+        for bias in
+            biases.filter(|bias| !judged.iter().any(|c| c.verdict == Verdict::Fail && c.basis() == Some(bias.basis)))
+        {
+            let text = format!("the mean of {} points is off by {:+.2} %", bias.readings, 100.0 * bias.mean);
+            remarks.push(Remark::Fault { text, points: bias.readings, worst: None, at: None });
+        }
+        for stated in recording.stated_errors.iter().filter(|stated| stated.is_failed_claim()) {
+            let text = format!("the errors that it states are refuted by repetition: {stated}");
+            remarks.push(Remark::Fault { text, points: judged.len(), worst: None, at: None });
+        }
+        remarks
+    }
+}
+
+/// The name of a case in capabilities.
+fn case_name(record: &CaseRecord) -> &str {
+    match &record.hidden_variant {
+        _ if record.is_calibration => CALIBRATION,
+        Some(variant) => &variant.of,
+        None => &record.name,
+    }
+}
+
+/// Whether a comparison judges an engine: other engines and hand methods are no references, nor are unreliable prints.
+fn is_judge(c: &Comparison) -> bool {
+    match &c.reference {
+        None => c.verdict == Verdict::Missing && c.value.is_none(),
+        Some(reference) => match reference.basis {
+            Basis::ClosedForm | Basis::Simulator => true,
+            Basis::Published => reference.caveat.is_none(),
+            Basis::Iesna | Basis::Engine => false,
+        },
+    }
+}
+
+/// What comparisons have in common that are not accurate.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum RemarkKey {
+    Fault(String),
+    Limit(String),
+    Undecided,
+}
+
+impl RemarkKey {
+    fn remark(self, comparisons: &[&Comparison]) -> Remark {
+        let with_deviation = comparisons.iter().filter_map(|c| Some((Deviation::of(c)?, c.meter.to_string())));
+        let (worst, at) = with_deviation.max_by(|(a, _), (b, _)| a.bound().total_cmp(&b.bound())).unzip();
+        let points = comparisons.len();
+        match self {
+            Self::Fault(text) => Remark::Fault { text, points, worst, at },
+            Self::Limit(text) => Remark::Limit { text, points, worst, at },
+            Self::Undecided => Remark::Undecided { points, worst, at },
+        }
+    }
+}
+
+impl VerdictCounts {
+    fn of(judged: &[&Comparison]) -> Self {
+        let mut counts = Self { all: judged.len(), ..Self::default() };
+        for c in judged {
+            let count = match c.verdict {
+                Verdict::Pass | Verdict::UnexpectedPass => &mut counts.passed,
+                Verdict::Fail | Verdict::Missing => &mut counts.failed,
+                Verdict::Undecided => &mut counts.undecided,
+                Verdict::KnownDeviation => &mut counts.known,
+                Verdict::NotJudged => &mut counts.not_judged,
+            };
+            *count += 1;
+        }
+        counts
+    }
+}
+
+impl PointEvidence {
+    fn of(c: &Comparison) -> Option<Self> {
+        let reference = c.reference.as_ref()?;
+        Some(Self {
+            meter: c.meter.to_string(),
+            value: c.value?,
+            reference: reference.value,
+            unit: c.quantity.unit().to_owned(),
+            deviation: Deviation::of(c)?,
+            verdict: c.verdict,
+            source: reference.source.clone(),
+        })
+    }
+}

@@ -1,0 +1,201 @@
+//! The page of a renderer and a capability: for each release the cases, their worst points, and how to repeat them.
+
+use luxproof_model::numbers::{plural, significant};
+use luxproof_report::minus;
+use maud::{Markup, html};
+
+use super::renderer_page::{crumb, crumb_link};
+use super::{frame, plot, sign};
+use crate::cards::anchor;
+use crate::{
+    Capability, CardRun, Cards, CaseEvidence, CellEvidence, Deviation, Measurement, Outcome, ReleaseEvidence, Remark,
+    RunId, Spread, Verification,
+};
+
+const ROOT: &str = "../../";
+
+pub(super) fn page(cards: &Cards, capability: &Capability, of: &CellEvidence) -> Markup {
+    let heading = format!("{}: {}", of.renderer, capability.title);
+    let content = html! {
+        header {
+            h1 { (heading) }
+            p.lead { (capability.question) " " a href={ (ROOT) "capabilities.html#" (capability.id) } { "Which cases show it" } }
+            @if of.releases.len() > 1 {
+                ul.jump aria-label="Releases" {
+                    @for release in &of.releases {
+                        li class={ "s-" (release.cell.standing.key()) } {
+                            a href={ "#" (anchor(&release.release)) } { (sign(&release.cell.standing)) " " (release.release) }
+                        }
+                    }
+                }
+            }
+        }
+        @for (k, release) in of.releases.iter().enumerate() { (release_section(cards, release, k == 0)) }
+        p.where { "The same as JSON: " a href={ (capability.id) ".json" } { code { (capability.id) ".json" } } }
+    };
+    let link = crumb_link(&of.renderer_slug);
+    frame(cards, &heading, ROOT, &[crumb(&link, &of.renderer)], &content, Some(SCRIPT))
+}
+
+/// Opens the release that a link names.
+const SCRIPT: &str = "const reveal=()=>{const s=document.getElementById(decodeURIComponent(location.hash.slice(1)));\
+const d=s&&s.querySelector('details');if(d){d.open=true;s.scrollIntoView()}};addEventListener('hashchange',reveal);reveal();";
+
+fn release_section(cards: &Cards, release: &ReleaseEvidence, is_newest: bool) -> Markup {
+    let standing = &release.cell.standing;
+    html! {
+        section.evidence id=(anchor(&release.release)) {
+            h2 class={ "s-" (standing.key()) } { (release.release) ": " span.badge { (sign(standing)) " " (standing.headline()) } }
+            p.lead { (minus(&standing.explanation())) }
+            p.where {
+                (release.cell.tested_cases) " of " (plural(release.cell.all_cases, "case")) ", "
+                (plural(release.cell.hidden_variants, "hidden variant")) ", " (plural(release.cell.points, "comparison"))
+                @if !release.cell.missing.is_empty() { "; in no run: " (release.cell.missing.join(", ")) }
+            }
+            @if let Some(spread) = &release.cell.spread { (spread_line(spread)) }
+            @if release.is_recorded { p.where { "These are recorded values. This release cannot be run again here, so they are not verified." } }
+            @if !release.cases.is_empty() {
+                details open[is_newest] {
+                    summary { "Evidence of " (release.release) }
+                    (plot::deviations(&release.cases))
+                    (case_table(release))
+                    @for case in &release.cases { (points(case)) }
+                    (repeat(cards, release))
+                }
+            }
+        }
+    }
+}
+
+fn spread_line(spread: &Spread) -> Markup {
+    let seeds: Vec<String> = spread.seeds.iter().map(u64::to_string).collect();
+    html! {
+        p.where {
+            "The same cases, public: " (bound(spread.public.as_ref())) "; hidden (seed " (seeds.join(", ")) "): "
+            (bound(spread.hidden.as_ref())) "."
+        }
+    }
+}
+
+/// The bound of a deviation, where there is one.
+fn bound(deviation: Option<&Deviation>) -> String {
+    deviation.map_or_else(|| "nothing measured".to_owned(), |deviation| format!("within {}", deviation.bound_text()))
+}
+
+fn case_table(release: &ReleaseEvidence) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label={ "Cases of " (release.release) } {
+            table.evidence {
+                thead { tr { th scope="col" { "case" } th scope="col" { "what" } th.number scope="col" { "points" } th.number scope="col" { "worst deviation" } th scope="col" { "result" } } }
+                tbody {
+                    @for case in &release.cases {
+                        tr {
+                            th scope="row" {
+                                (case.case)
+                                @if let Some(variant) = &case.hidden { " " span.tag { "hidden, seed " (variant.seed) } }
+                                span.title { (case.title) }
+                            }
+                            td { (case.procedure.title()) }
+                            (outcome_cells(case))
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn outcome_cells(case: &CaseEvidence) -> Markup {
+    html! {
+        @match &case.outcome {
+            Outcome::Measured(measurement) => {
+                td.number { (measurement.verdicts.all) }
+                td.number { @if let Some(worst) = &measurement.worst { (worst) } @else { "–" } }
+                td { (result(measurement)) }
+            }
+            Outcome::Unsupported { reason } => { td.number { "0" } td.number { "–" } td { "declined: " (reason) } }
+            Outcome::NotRun { reason } => { td.number { "0" } td.number { "–" } td { "not run: " (reason) } }
+            Outcome::Failed { reason } => { td.number { "0" } td.number { "–" } td.bad { "failed: " (reason) } }
+        }
+    }
+}
+
+fn result(measurement: &Measurement) -> Markup {
+    let counts = &measurement.verdicts;
+    html! {
+        (counts.passed) " of " (counts.all) " pass"
+        @for remark in &measurement.remarks {
+            br;
+            @match remark {
+                Remark::Fault { text, points, .. } => span.bad { (points) " wrong: " (if text.is_empty() { "no known cause" } else { text }) },
+                Remark::Limit { text, points, .. } => { (points) " limited: " (text) },
+                Remark::Undecided { points, .. } => { (points) " undecided: more samples would decide" },
+            }
+        }
+    }
+}
+
+/// The points of a case with the largest bounds.
+fn points(case: &CaseEvidence) -> Markup {
+    let Outcome::Measured(measurement) = &case.outcome else { return html! {} };
+    html! {
+        @if !measurement.points.is_empty() {
+            details {
+                summary { "Worst points of " (case.case) @if let Some(variant) = &case.hidden { " (hidden, seed " (variant.seed) ")" } ", " (case.procedure.title().to_lowercase()) }
+                div.scroll tabindex="0" role="region" aria-label={ "Worst points of " (case.reported_as) } {
+                    table {
+                        thead { tr { th scope="col" { "point" } th.number scope="col" { "value" } th.number scope="col" { "reference" } th.number scope="col" { "deviation" } th scope="col" { "verdict" } th scope="col" { "reference by" } } }
+                        tbody {
+                            @for point in &measurement.points {
+                                tr {
+                                    th scope="row" { (point.meter) }
+                                    td.number { (significant(point.value)) " " (point.unit) }
+                                    td.number { (significant(point.reference)) " " (point.unit) }
+                                    td.number { (point.deviation) }
+                                    td { (point.verdict.name()) }
+                                    td { (point.source) }
+                                }
+                            }
+                        }
+                    }
+                }
+                @if let Some(command) = &case.command { p { "By hand:" } pre.commands tabindex="0" { code { (command) } } }
+            }
+        }
+    }
+}
+
+/// The runs behind a release, with their commands, reports and bundles.
+fn repeat(cards: &Cards, release: &ReleaseEvidence) -> Markup {
+    let mut ids: Vec<&RunId> = release.cases.iter().map(|case| &case.run).collect();
+    ids.sort();
+    ids.dedup();
+    html! {
+        h3 { "Check it" }
+        @for run in cards.runs.iter().filter(|run| ids.contains(&&run.id)) { (run_entry(run)) }
+    }
+}
+
+fn run_entry(run: &CardRun) -> Markup {
+    html! {
+        p {
+            "Run of " (run.started.replace('T', " ").replace('Z', " UTC")) " by luxproof " (run.tool) ". "
+            @match &run.verification {
+                Verification::Own => {},
+                Verification::Reproduced { same_bytes, within, .. } => {
+                    "Submitted, and run again by the publisher: " (same_bytes) " to the byte, " (within) " within uncertainties. "
+                }
+            }
+            @if let Some(report) = &run.report { a href={ (ROOT) (report) } { "Full report with every point and plan" } ". " }
+            @if let Some(bundle) = &run.bundle { a href={ (ROOT) (bundle) } { "Bundle" } " with all inputs." }
+        }
+        @if let Some(command) = &run.command {
+            pre.commands tabindex="0" {
+                code {
+                    (command)
+                    @if let Some(bundle) = &run.bundle { "\nluxproof reproduce " (bundle.rsplit('/').next().unwrap_or(bundle)) " # the same from the bundle" }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! The first page: renderers by capabilities, each at its newest release.
+
+use itertools::Itertools;
+use luxproof_model::numbers::plural;
+use maud::{Markup, html};
+
+use super::{frame, legend, shortened, sign};
+use crate::cards::anchor;
+use crate::{Capability, Cards, CellCard, RendererCard, Standing};
+
+const SCRIPT: &str = include_str!("index.js");
+/// Letters of a fault that the matrix shows.
+const SHOWN_LETTERS: usize = 58;
+/// Changes that the first page lists.
+const LISTED_CHANGES: usize = 12;
+
+pub(super) fn page(cards: &Cards) -> Markup {
+    let releases: usize = cards.renderers.iter().map(|renderer| renderer.releases.len()).sum();
+    let content = html! {
+        header {
+            h1 { "What each renderer can be trusted for" }
+            p.lead {
+                "Does it read the photometric file, and is the light right? "
+                (plural(cards.renderers.len(), "renderer")) " in " (plural(releases, "release")) ", judged by closed forms and by an "
+                "independent calculation that states its own error. The worst point of the worst case counts. Each cell leads to its evidence."
+            }
+            (legend())
+        }
+        section aria-labelledby="matrix-title" {
+            h2 id="matrix-title" { "Newest releases" }
+            (filters(cards))
+            (matrix(cards))
+        }
+        (hidden_variants(cards))
+        (latest_changes(cards))
+    };
+    frame(cards, "What each renderer can be trusted for", "", &[], &content, Some(SCRIPT))
+}
+
+/// Search and filters, which work with the script only; the page does not need them.
+fn filters(cards: &Cards) -> Markup {
+    html! {
+        div.filters role="search" {
+            label { "Search " input id="search" type="search" placeholder="renderer or capability" autocomplete="off"; }
+            label {
+                "Show " select id="state" {
+                    option value="" { "every state" }
+                    option value="accurate" { "accurate" }
+                    option value="limited" { "limited" }
+                    option value="wrong" { "wrong" }
+                    option value="unsupported" { "not supported" }
+                    option value="untested" { "not tested" }
+                }
+            }
+            label {
+                "Go to " select id="release" {
+                    option value="" { "a release" }
+                    @for renderer in &cards.renderers {
+                        optgroup label=(renderer.name) {
+                            @for release in &renderer.releases {
+                                option value={ "renderers/" (renderer.slug) "/index.html#" (anchor(&release.release)) } {
+                                    (renderer.name) " " (release.release)
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+            output id="shown" for="search state" {}
+        }
+    }
+}
+
+fn matrix(cards: &Cards) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label="Renderers by capabilities" {
+            table.cards id="matrix" {
+                thead {
+                    tr {
+                        th scope="col" { "Capability" }
+                        @for renderer in &cards.renderers { th scope="col" data-name=(renderer.name.to_lowercase()) { (column_head(renderer)) } }
+                    }
+                }
+                @for (group, capabilities) in &cards.capabilities.capabilities.iter().chunk_by(|c| c.group.as_str()) {
+                    tbody {
+                        tr.group { th scope="rowgroup" colspan=(cards.renderers.len() + 1) { (group) } }
+                        @for capability in capabilities { (row(cards, capability)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The renderer, its newest release, and the link to the others.
+fn column_head(renderer: &RendererCard) -> Markup {
+    let newest = renderer.releases.first().map(|release| release.release.as_str()).unwrap_or_default();
+    html! {
+        a href={ "renderers/" (renderer.slug) "/index.html" } { (renderer.name) }
+        span.release { (shortened(newest, 16)) }
+        @if renderer.releases.len() > 1 {
+            details {
+                summary { (renderer.releases.len()) " releases" }
+                ul.releases {
+                    @for release in &renderer.releases {
+                        li {
+                            a href={ "renderers/" (renderer.slug) "/index.html#" (anchor(&release.release)) } { (shortened(release.release.as_str(), 16)) }
+                            @if !release.changes.is_empty() { ", " (plural(release.changes.len(), "change")) }
+                        }
+                    }
+                }
+            }
+        }
+        @if renderer.is_own { span.release { "luxproof's own" } }
+        @if renderer.releases.first().is_some_and(|release| release.is_recorded) { span.release { "recorded values" } }
+    }
+}
+
+fn row(cards: &Cards, capability: &Capability) -> Markup {
+    let text = format!("{} {} {}", capability.group, capability.title, capability.question).to_lowercase();
+    html! {
+        tr data-text=(text) {
+            th scope="row" { a href={ "capabilities.html#" (capability.id) } { (capability.title) } }
+            @for renderer in &cards.renderers {
+                @match renderer.releases.first().and_then(|release| release.cell(&capability.id)) {
+                    Some(cell) => (matrix_cell(renderer, cell)),
+                    None => td {},
+                }
+            }
+        }
+    }
+}
+
+fn matrix_cell(renderer: &RendererCard, cell: &CellCard) -> Markup {
+    let standing = &cell.cell.standing;
+    html! {
+        td class={ "s-" (standing.key()) } data-renderer=(renderer.name) {
+            a.cell href=(cell.page) {
+                (sign(standing)) " " (cell.headline)
+                @if let Standing::Wrong { fault: text, .. } | Standing::Limited { what: text, .. } = standing {
+                    span.why { (shortened(text, SHOWN_LETTERS)) }
+                }
+                @if let Some(since) = &cell.since { span.since { "since " (shortened(since.as_str(), 16)) } }
+            }
+        }
+    }
+}
+
+/// What hidden variants are, and their seeds.
+fn hidden_variants(cards: &Cards) -> Markup {
+    html! {
+        @if !cards.seeds.is_empty() {
+            section aria-labelledby="hidden-title" {
+                h2 id="hidden-title" { "Hidden variants" }
+                p.lead {
+                    "A renderer could be tuned to cases that everyone knows. So each case was also run in a variant that a seed draws anew: "
+                    "another room, other positions, another table. The worst of both counts. "
+                    (if cards.seeds.len() == 1 { "Seed: " } else { "Seeds: " }) (cards.seeds.iter().join(", ")) "."
+                }
+            }
+        }
+    }
+}
+
+fn latest_changes(cards: &Cards) -> Markup {
+    let newest = cards.renderers.iter().flat_map(|renderer| {
+        let release = renderer.releases.iter().find(|release| !release.changes.is_empty());
+        release
+            .into_iter()
+            .flat_map(move |release| release.changes.iter().map(move |change| (renderer, release, change)))
+    });
+    let newest: Vec<_> = newest.collect();
+    html! {
+        @if !newest.is_empty() {
+            section aria-labelledby="changes-title" {
+                h2 id="changes-title" { "Latest changes" }
+                ul.changes {
+                    @for (renderer, release, change) in newest.iter().take(LISTED_CHANGES) {
+                        li {
+                            a href={ "renderers/" (renderer.slug) "/" (change.capability) ".html#" (anchor(&release.release)) } {
+                                (renderer.name) " " (release.release) ", " (title(cards, change.capability.as_str()))
+                            }
+                            ": " (change.from) " in " (change.before) ", " strong { (change.to) } " now"
+                        }
+                    }
+                }
+                @if newest.len() > LISTED_CHANGES {
+                    p { (newest.len() - LISTED_CHANGES) " more are on the pages of the renderers." }
+                }
+            }
+        }
+    }
+}
+
+/// The title of a capability.
+pub(super) fn title<'a>(cards: &'a Cards, id: &'a str) -> &'a str {
+    let mut all = cards.capabilities.capabilities.iter();
+    all.find(|capability| capability.id.as_str() == id).map_or(id, |capability| &capability.title)
+}

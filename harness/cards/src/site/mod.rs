@@ -1,0 +1,143 @@
+//! The pages of the site: plain HTML that loads nothing, for any static host and for `file://`.
+//!
+//! The first page is the matrix of renderers by capabilities. A renderer's page has its releases, and a page of a renderer and a
+//! capability has the evidence. Every text is escaped, and every path is made of slugs.
+
+mod capability_page;
+mod evidence_page;
+mod index;
+mod plot;
+mod renderer_page;
+#[cfg(test)]
+mod tests;
+
+use luxproof_report::{BASE_STYLE, minus};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use crate::{Cards, CardsError, CellEvidence, Standing};
+
+/// The file with every cell, in the root of the site.
+pub const CARDS_FILE: &str = "cards.json";
+
+const STYLE: &str = include_str!("cards.css");
+/// The browser refuses to load anything.
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
+
+/// A file of the site.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SiteFile {
+    /// Relative to the root of the site, with `/` between its parts.
+    pub path: String,
+    pub content: String,
+}
+
+/// All pages with the JSON behind them; reports and bundles of runs are the caller's.
+pub fn files(cards: &Cards, evidence: &[CellEvidence]) -> Result<Vec<SiteFile>, CardsError> {
+    let mut files = vec![
+        page("index.html", index::page(cards)),
+        page("capabilities.html", capability_page::page(cards)),
+        SiteFile { path: CARDS_FILE.to_owned(), content: serde_json::to_string(cards)? },
+    ];
+    for renderer in &cards.renderers {
+        files.push(page(&format!("renderers/{}/index.html", renderer.slug), renderer_page::page(cards, renderer)));
+    }
+    for of in evidence {
+        let Some(capability) = cards.capabilities.capabilities.iter().find(|c| c.id == of.capability) else { continue };
+        let stem = format!("renderers/{}/{}", of.renderer_slug, of.capability);
+        files.push(page(&format!("{stem}.html"), evidence_page::page(cards, capability, of)));
+        files.push(SiteFile { path: format!("{stem}.json"), content: serde_json::to_string(of)? });
+    }
+    Ok(files)
+}
+
+fn page(path: &str, markup: Markup) -> SiteFile {
+    SiteFile { path: path.to_owned(), content: markup.into_string() }
+}
+
+/// A link from a page to one above it.
+struct Crumb<'a> {
+    link: &'a str,
+    name: &'a str,
+}
+
+/// The frame of every page. `root` leads from its folder to the root of the site, as `../../`.
+fn frame(
+    cards: &Cards,
+    title: &str,
+    root: &str,
+    crumbs: &[Crumb<'_>],
+    content: &Markup,
+    script: Option<&'static str>,
+) -> Markup {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="generator" content=(format!("luxproof {}", cards.tool));
+                title { (title) " · luxproof score cards" }
+                style { (PreEscaped(BASE_STYLE)) (PreEscaped(STYLE)) }
+                noscript { style { ".filters{display:none}" } }
+            }
+            body {
+                a.skip href="#main" { "Skip to the content" }
+                nav aria-label="Site" {
+                    div.bar {
+                        a.brand href={ (root) "index.html" } { "luxproof score cards" }
+                        @for crumb in crumbs { span aria-hidden="true" { "›" } a href={ (root) (crumb.link) } { (crumb.name) } }
+                        a.about href={ (root) "capabilities.html" } { "What is tested, and how" }
+                    }
+                }
+                main id="main" { (content) }
+                footer {
+                    "Made by luxproof " (cards.tool) ". Every number is in " a href={ (root) (CARDS_FILE) } { code { (CARDS_FILE) } }
+                    "; each page with evidence has a JSON file of the same name. This site loads nothing from elsewhere."
+                }
+                @if let Some(script) = script { script { (PreEscaped(script)) } }
+            }
+        }
+    }
+}
+
+/// The sign of a state with its word for readers who only hear it.
+fn sign(standing: &Standing) -> Markup {
+    html! { span.sign aria-hidden="true" { (standing.sign()) } }
+}
+
+/// What the signs mean.
+fn legend() -> Markup {
+    const MEANINGS: [(&str, &str, &str, &str); 5] = [
+        (
+            "accurate",
+            "✓",
+            "within x %",
+            "every point of every case passes; no error is larger than x, uncertainty included",
+        ),
+        ("limited", "≈", "limited", "right within limits that are known, or not decided yet"),
+        ("wrong", "✕", "wrong", "at least one value is wrong; the page names the fault"),
+        ("unsupported", "–", "not supported", "the renderer cannot do it"),
+        ("untested", "·", "not tested", "too few cases were run"),
+    ];
+    html! {
+        dl.legend {
+            @for (key, sign, word, meaning) in MEANINGS {
+                div { dt class={ "s-" (key) } { span.sign aria-hidden="true" { (sign) } " " (word) } dd { (meaning) } }
+            }
+        }
+    }
+}
+
+/// A text with real minus signs, cut at so many letters.
+fn shortened(text: &str, letters: usize) -> String {
+    let text = minus(text);
+    if text.chars().count() <= letters {
+        return text;
+    }
+    let cut: String = text.chars().take(letters).collect();
+    // Not within a word, where one ends before.
+    let end = cut.rfind(' ').filter(|end| 2 * end > cut.len()).unwrap_or(cut.len());
+    format!("{}…", &cut[..end])
+}

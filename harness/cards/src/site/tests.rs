@@ -1,0 +1,125 @@
+//! The pages as a browser gets them: links, escaping, and paths.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use luxproof_model::{Report, Tool};
+
+use super::{SiteFile, files};
+use crate::fixtures::{MadeCase, capabilities, report};
+use crate::{CardRun, Cards, Verification};
+
+fn site(reports: &[Report]) -> Vec<SiteFile> {
+    let runs: Vec<(CardRun, &Report)> = reports.iter().map(|r| (CardRun::of(r, Verification::Own), r)).collect();
+    let (cards, evidence) = Cards::of(&capabilities(2), &runs, Tool::default()).unwrap();
+    files(&cards, &evidence).unwrap()
+}
+
+fn content<'a>(files: &'a [SiteFile], path: &str) -> &'a str {
+    let file = files.iter().find(|file| file.path == path);
+    &file.unwrap_or_else(|| panic!("no {path} in {:?}", files.iter().map(|f| &f.path).collect::<Vec<_>>())).content
+}
+
+fn usual() -> Vec<Report> {
+    let right = [
+        MadeCase::new("a").off(0.001, 0.001),
+        MadeCase::new("b").off(0.0, 0.001),
+        MadeCase::new("a").hidden(7).off(0.0, 0.001),
+    ];
+    let wrong = [MadeCase::new("a").off(0.5, 0.001), MadeCase::new("b").off(0.0, 0.001)];
+    vec![report("rays@1.0", "1.0", &right), report("rays@2.0", "2.0", &wrong), report("other", "v3.1 (x)", &right)]
+}
+
+/// The values of an attribute in a page.
+fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
+    let start = format!(" {name}=\"");
+    page.split(start.as_str()).skip(1).filter_map(|rest| rest.split('"').next()).collect()
+}
+
+/// The path that a link leads to from a page.
+fn resolve(from: &str, link: &str) -> String {
+    let mut parts: Vec<&str> = from.split('/').collect();
+    parts.pop();
+    for part in link.split('/') {
+        match part {
+            ".." => assert!(parts.pop().is_some(), "{link} of {from} leaves the site"),
+            part => parts.push(part),
+        }
+    }
+    parts.join("/")
+}
+
+fn is_page(file: &SiteFile) -> bool {
+    file.content.starts_with("<!DOCTYPE html>")
+}
+
+#[test]
+fn every_link_leads_to_a_page_and_an_anchor_of_the_site() {
+    let files = site(&usual());
+    let anchors: BTreeMap<&str, BTreeSet<&str>> =
+        files.iter().map(|file| (file.path.as_str(), attributes(&file.content, "id").into_iter().collect())).collect();
+    let mut links = 0;
+    for page in files.iter().filter(|file| is_page(file)) {
+        for link in attributes(&page.content, "href") {
+            let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target = if path.is_empty() { page.path.clone() } else { resolve(&page.path, path) };
+            let known = anchors.get(target.as_str()).unwrap_or_else(|| panic!("{}: no page {link}", page.path));
+            assert!(anchor.is_empty() || known.contains(anchor), "{}: no anchor {link}", page.path);
+            links += 1;
+        }
+    }
+    assert!(links > 40, "{links}");
+}
+
+#[test]
+fn a_cell_has_a_sign_a_text_and_a_class_and_leads_to_the_evidence_of_its_release() {
+    let files = site(&usual());
+    let index = content(&files, "index.html");
+    let cell = index.split("<td ").find(|cell| cell.contains("data-renderer=\"rays\"")).unwrap();
+    assert!(
+        cell.starts_with("class=\"s-wrong\"") && cell.contains("✕") && cell.contains("wrong, up to 51 %"),
+        "{cell}"
+    );
+    assert!(cell.contains("href=\"renderers/rays/direct.html#r-2.0\"") && cell.contains("since 2.0"), "{cell}");
+    let evidence = content(&files, "renderers/rays/direct.html");
+    for text in ["floor[0]", "150.000 lx", "100.000 lx", "+50.00 ± 0.10 %", "hidden, seed 7", "within 0.2 %"] {
+        assert!(evidence.contains(text), "no {text}");
+    }
+}
+
+#[test]
+fn pages_load_nothing_and_work_without_their_script() {
+    for file in site(&usual()).iter().filter(|file| is_page(file)) {
+        let page = &file.content;
+        assert!(page.contains("default-src 'none'"), "{}", file.path);
+        assert!(!page.contains("http:") && !page.contains("https:") && !page.contains(" src="), "{}", file.path);
+    }
+}
+
+#[test]
+fn names_of_strangers_are_neither_markup_nor_paths() {
+    let evil = "</script><img src=x onerror=alert(1)>\"'";
+    let mut given = MadeCase::new("a").off(0.5, 0.0);
+    given.title = evil.to_owned();
+    let mut wrong = report("../../<b>up", "../<i>1\"", &[given, MadeCase::new("b").off(0.0, 0.0)]);
+    wrong.comparisons[0].diagnosis = Some(evil.to_owned());
+    wrong.recordings[0].command = Some(evil.to_owned());
+    wrong.spec.title = evil.to_owned();
+    let files = site(&[wrong]);
+    for file in &files {
+        assert!(file.path.split('/').all(|part| !part.is_empty() && !part.starts_with('.')), "{}", file.path);
+        assert!(file.path.bytes().all(|b| b.is_ascii_alphanumeric() || b"/._-".contains(&b)), "{}", file.path);
+        if is_page(file) {
+            for markup in ["<img", "<b>", "<i>", "</script><img"] {
+                assert!(!file.content.contains(markup), "{}: {markup}", file.path);
+            }
+            assert!(attributes(&file.content, "href").iter().all(|link| !link.contains(['<', '\'', ' '])));
+        }
+    }
+}
+
+#[test]
+fn a_plot_shows_public_cases_as_circles_and_hidden_ones_as_squares() {
+    let files = site(&usual());
+    let page = content(&files, "renderers/other/direct.html");
+    assert_eq!((page.matches("<circle").count(), page.matches("<rect").count()), (2, 1));
+}
