@@ -200,7 +200,7 @@ fn a_broken_protocol_is_reported() {
         .complains("--adapter starts a program");
     // What follows the command is luxproof's own, or it is said what to do.
     let unquoted = ["engines", "doctor", "--adapter", "python3", "mine.py"];
-    folder.luxproof(&unquoted).exits(2).complains("in quotes: --adapter \"python3 mine.py\"");
+    folder.luxproof(&unquoted).exits(2).complains("arguments in quotes: --adapter \"python3");
     folder.luxproof(&["engines", "doctor", "--adapter", "./gone", "--out", "kept"]).exits(3);
     assert!(folder.path("kept").is_dir());
 }

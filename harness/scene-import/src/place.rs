@@ -46,7 +46,7 @@ impl MeterGrid {
     }
 
     /// Where its meters are once it is written.
-    fn meters(self) -> impl Iterator<Item = DVec3> {
+    pub fn meters(self) -> impl Iterator<Item = DVec3> {
         let (origin, [dx, dy]) = (written(self.origin_m), self.step_m.map(to_written));
         let [nx, ny] = self.counts;
         (0..nx * ny).map(move |k| origin + DVec3::new(dx * (k % nx) as f64, dy * (k / nx) as f64, 0.0))

@@ -1,12 +1,11 @@
 //! Lints: valid but suspicious input, reported before a run.
 
 use std::collections::HashMap;
-use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::DVec3;
 use luxproof_calculators::ugr::observer::{Glare, SOLID_ANGLES_SR};
-use luxproof_scene::geometry::solid_angle_sr;
+use luxproof_scene::geometry::is_inside_closed;
 use luxproof_scene::{Luminaire, LuminaireModel, Meter, Shape, Transport};
 
 use super::{Case, SpecError};
@@ -38,8 +37,6 @@ const WIDE: f64 = 0.5;
 const BEFORE_A_SURFACE_M: f64 = 0.05;
 /// Meters times luminaires, or triangles times luminaires, that are looked at.
 const MAX_LOOKS: usize = 1_000_000;
-/// The part of the whole sphere that a body fills around a point inside it, but for gaps of rounded corners.
-const CLOSED_PART: f64 = 0.999;
 /// How far from its centre an opening may reach, in metres; beyond that it is asked for light as if it were a point.
 const OPENING_M: f64 = 2.0;
 
@@ -212,8 +209,13 @@ fn enclosed_luminaires(case: &Case) -> Vec<SpecLint> {
 
 /// Meters inside closed meshes, which no light enters. Those inside boxes are refused.
 fn enclosed_meters(case: &Case) -> Vec<SpecLint> {
-    let meshes: Vec<(usize, &Shape, [DVec3; 2])> =
-        case.scene.obstacles.iter().enumerate().filter_map(|(k, o)| Some((k, &o.shape, mesh_bounds_m(&o.shape)?))).collect();
+    let meshes: Vec<(usize, &Shape, [DVec3; 2])> = case
+        .scene
+        .obstacles
+        .iter()
+        .enumerate()
+        .filter_map(|(k, o)| Some((k, &o.shape, mesh_bounds_m(&o.shape)?)))
+        .collect();
     let faults = case.meters.iter().filter_map(|(name, meters)| {
         let mut found: Vec<(usize, usize)> = vec![];
         for (k, meter) in meters.iter().enumerate() {
@@ -245,12 +247,7 @@ fn is_inside(shape: &Shape, point: DVec3, points: usize) -> bool {
     match shape {
         Shape::Box { min_m, max_m } => point.cmpgt(*min_m).all() && point.cmplt(*max_m).all(),
         Shape::Mesh { triangles, .. } if triangles.len().saturating_mul(points) > MAX_LOOKS => false,
-        Shape::Mesh { vertices_m, triangles } => {
-            let corners = triangles.iter().map(|t| t.map(|k| vertices_m[k as usize] - point));
-            // Inside a closed body its faces fill the whole sphere. An open one, a lampshade say, leaves a part of it. What faces
-            // inwards is a room of its own, as imported scenes have it.
-            corners.map(solid_angle_sr).sum::<f64>() > CLOSED_PART * 4.0 * PI
-        }
+        Shape::Mesh { vertices_m, triangles } => is_inside_closed(vertices_m, triangles, point),
     }
 }
 

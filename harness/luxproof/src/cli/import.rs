@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use luxproof_scene::geometry::Room;
+use glam::DVec3;
+use luxproof_scene::geometry::{Room, is_inside_closed};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::TextOrJson;
@@ -15,7 +16,7 @@ use luxproof_console::{diagnose, warn};
 use luxproof_model::Exit;
 use luxproof_process::files::keep_shared;
 use luxproof_process::printable;
-use luxproof_scene_import::{Imported, Options, RoomMesh, Up, Walls, import};
+use luxproof_scene_import::{Imported, MeterGrid, Options, RoomMesh, Up, Walls, import};
 use luxproof_spec::{Case, Trust, find_lints, suite};
 
 #[derive(Debug, Args)]
@@ -140,9 +141,29 @@ fn text(scene: &Path, spec: &Path, imported: &Imported) -> String {
         photometry: Path::new(DOWNLIGHT),
         place: imported.place,
         model: None,
-        desk: DeskMeters::Coarse,
+        desk: desk_meters(imported),
     };
     first.text()
+}
+
+/// Triangles times meters that are looked at for meters inside bodies.
+const MAX_LOOKS: usize = 10_000_000;
+
+/// Meters at desk height that lie inside no closed body: light reaches none of those that do.
+fn desk_meters(imported: &Imported) -> DeskMeters {
+    let is_open = |at_m: &DVec3| {
+        !imported
+            .meshes
+            .iter()
+            .any(|part| is_inside_closed(&part.mesh.vertices_m, &part.mesh.triangles, *at_m - imported.origin_m))
+    };
+    let all: Vec<DVec3> = MeterGrid::within(imported.place.low_m, imported.place.high_m).meters().collect();
+    let triangles: usize = imported.meshes.iter().map(|part| part.mesh.triangles.len()).sum();
+    if triangles.saturating_mul(all.len()) > MAX_LOOKS {
+        return DeskMeters::Coarse;
+    }
+    let open: Vec<DVec3> = all.iter().copied().filter(is_open).collect();
+    if open.is_empty() || open.len() == all.len() { DeskMeters::Coarse } else { DeskMeters::Points(open) }
 }
 
 /// Writes a file of the imported scene.

@@ -360,7 +360,7 @@ mod tests {
     fn margins_are_left_out_where_the_room_is_wide_enough() {
         let margin = |size| match desk_by_en_12464(size) {
             DeskMeters::ByEn12464 { margin_m, height_m, .. } => (margin_m, height_m),
-            DeskMeters::Coarse => (f64::NAN, f64::NAN),
+            DeskMeters::Coarse | DeskMeters::Points(_) => (f64::NAN, f64::NAN),
         };
         assert_eq!(margin([5.0, 4.0, 2.8]), (0.5, 0.75));
         assert_eq!(margin([5.0, 1.9, 1.0]), (0.0, 0.4));

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use glam::DVec3;
 use luxproof_report::words::trimmed;
 use luxproof_scene_import::{MeterGrid, Place};
 use luxproof_spec::en_12464_counts;
@@ -30,18 +31,20 @@ pub(super) struct First<'a> {
 }
 
 /// The meters at desk height.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum DeskMeters {
     /// A coarse grid in the place.
     Coarse,
+    /// Points of that grid, where bodies stand in the others.
+    Points(Vec<DVec3>),
     /// As fine as EN 12464-1 requires, over a floor of this size with this margin along the walls.
     ByEn12464 { floor_m: [f64; 2], height_m: f64, margin_m: f64 },
 }
 
 impl DeskMeters {
     /// The lines of YAML of the set.
-    fn text(self, place: Place) -> String {
-        match self {
+    fn text(&self, place: Place) -> String {
+        match *self {
             Self::Coarse => {
                 let MeterGrid { origin_m, step_m, counts } = MeterGrid::within(place.low_m, place.high_m);
                 let [ox, oy, oz] = origin_m.to_array().map(number);
@@ -50,6 +53,15 @@ impl DeskMeters {
                     "  desk:                                      # a grid at desk height; or points_m: [[1, 1, 0.75], ...]\n    \
                      grid: {{origin_m: [{ox}, {oy}, {oz}], u_m: [{dx}, 0, 0], v_m: [0, {dy}, 0], counts: [{nx}, {ny}]}}\n    \
                      normal: [0, 0, 1]                        # they face up"
+                )
+            }
+            Self::Points(ref points_m) => {
+                let points = points_m.iter().map(|p| format!("[{}]", p.to_array().map(number).join(", ")));
+                format!(
+                    "  desk:                                      # a grid at desk height, without the points inside bodies\n    \
+                     points_m: [{}]\n    \
+                     normal: [0, 0, 1]                        # they face up",
+                    points.collect::<Vec<_>>().join(", ")
                 )
             }
             Self::ByEn12464 { floor_m, height_m, margin_m } => {

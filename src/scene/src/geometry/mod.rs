@@ -7,5 +7,5 @@ pub mod obj;
 pub mod polygon;
 mod room;
 
-pub use mesh::{Mesh, MeshError, solid_angle_sr};
+pub use mesh::{Mesh, MeshError, is_inside_closed, solid_angle_sr};
 pub use room::{Reflectances, Room, Surface};

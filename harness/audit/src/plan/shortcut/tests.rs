@@ -173,7 +173,8 @@ fn a_meter_that_a_narrow_flood_of_type_b_lights_is_not_dark() {
             let fill = Shortcut::of(&job).fill;
             for (sensor, fill) in job.sensors.iter().zip(&fill) {
                 let to_meter = sensor.meter.position_m - lamp.position_m;
-                if lamp.intensity_towards(to_meter.normalize()).value() > 0.0 && to_meter.dot(sensor.meter.normal) < 0.0 {
+                if lamp.intensity_towards(to_meter.normalize()).value() > 0.0 && to_meter.dot(sensor.meter.normal) < 0.0
+                {
                     lit += 1;
                     assert_ne!(*fill, Fill::Dark, "{vertical_deg:?} {horizontal} {tilt_deg}: {}", sensor.id);
                 }
@@ -186,11 +187,13 @@ fn a_meter_that_a_narrow_flood_of_type_b_lights_is_not_dark() {
 #[test]
 fn a_meter_close_above_an_uplight_is_lit_though_no_corner_lights_it() {
     let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
-    let table = luxproof_photometry::LuminousIntensityDistribution::axial(vec![0.0, 119.0, 120.0, 180.0], vec![
-        0.0, 0.0, 500.0, 500.0,
-    ]);
+    let table = luxproof_photometry::LuminousIntensityDistribution::axial(
+        vec![0.0, 119.0, 120.0, 180.0],
+        vec![0.0, 0.0, 500.0, 500.0],
+    );
     let lamp = fixtures::luminaire("panel", DVec3::new(3.0, 2.0, 1.0), table.unwrap());
-    job.scene.luminaires = vec![fixtures::with_opening(lamp, LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 })];
+    job.scene.luminaires =
+        vec![fixtures::with_opening(lamp, LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 })];
     // The middle sees it straight above, the corners at 97 degrees, where the table is dark.
     job.sensors = fixtures::sensors(&[[3.0, 2.0, 1.05]], DVec3::NEG_Z);
     assert_eq!(Shortcut::of(&job).fill, [Fill::Rendered(0)]);
