@@ -25,8 +25,10 @@ const UNEVEN_GAMMAS: [f64; 4] = [0.0, 60.0, 75.0, 90.0];
 const UNEVEN_PLANES: [f64; 7] = [0.0, 90.0, 180.0, 225.0, 270.0, 315.0, 360.0];
 /// The lamp flux of EULUMDAT files, by which the numbers of the table are divided.
 const KILOLUMENS: f64 = 8.0;
-const NATIVE_ANGLES: [f64; 5] = [-90.0, -45.0, 0.0, 45.0, 90.0];
-const NATIVE_VERTICALS: [f64; 7] = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0];
+const NATIVE_ANGLES: [f64; 7] = [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0];
+/// More than horizontal angles: a table in the wrong order is then no table with exchanged axes.
+const NATIVE_VERTICALS: [f64; 13] = [-90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0];
+const NATIVE_HALF: [f64; 4] = [0.0, 30.0, 60.0, 90.0];
 
 /// All files of the pack, those of LM-63 first.
 pub fn pack_files() -> Vec<PackFile> {
@@ -52,9 +54,18 @@ fn type_c(planes: &[f64], gammas: &[f64], form: ClosedForm, factor: f64) -> Pack
         form,
         table: Table::tabulate(Goniometer::C, planes, gammas, form, factor),
         document: Document::Lm63(Lm63::default()),
-        directions: nodes_of_type_c(),
+        directions: without_edges(nodes_of_type_c(), gammas),
         variants: vec![],
     }
+}
+
+/// Directions that are not on the end of a table that ends before a pole: there rounding decides between light and dark.
+fn without_edges(directions: Vec<AskedDirection>, gammas: &[f64]) -> Vec<AskedDirection> {
+    let is_edge = |gamma: f64| {
+        let is_end = gammas.first() == Some(&gamma) || gammas.last() == Some(&gamma);
+        is_end && gamma != 0.0 && gamma != 180.0
+    };
+    directions.into_iter().filter(|asked| !is_edge(asked.gamma_deg)).collect()
 }
 
 /// Directions on nodes of every table of type C in steps of 45 and 30 degrees, or beyond its end.
@@ -223,7 +234,7 @@ fn lm63_ranges() -> Vec<PackFile> {
 /// Nodes of the file in uneven steps.
 fn nodes_of_uneven_steps() -> Vec<AskedDirection> {
     let mut directions = vec![AskedDirection::exact(0.0, 0.0)];
-    for gamma in [60.0, 75.0, 90.0, 120.0] {
+    for gamma in [60.0, 75.0, 120.0] {
         directions.extend([0.0, 90.0, 180.0, 225.0, 270.0].map(|c| AskedDirection::exact(c, gamma)));
     }
     directions
@@ -247,7 +258,7 @@ fn lm63_types() -> Vec<PackFile> {
             name: "type-b-half.ies",
             feature: "Photometric type B with H from 0 to 90: the half with negative H is the mirror image.",
             variants: vec![Variant::AimedAtNadir, Variant::AimedAtHorizon],
-            ..native(Goniometer::B, &QUADRANT, ClosedForm::MirroredInC0, 1.0)
+            ..native(Goniometer::B, &NATIVE_HALF, ClosedForm::MirroredInC0, 1.0)
         },
     ]
 }
@@ -267,16 +278,13 @@ fn native(goniometer: Goniometer, horizontals: &[f64], form: ClosedForm, factor:
 
 /// Nodes of a table of type A or B, and directions beyond its end.
 fn native_directions(goniometer: Goniometer) -> Vec<AskedDirection> {
-    let mut nodes = vec![(0.0, 0.0), (90.0, 0.0), (-90.0, 0.0)];
-    for v in [-60.0, -30.0, 30.0, 60.0] {
-        nodes.push((0.0, v));
+    // Not on the edges of the table, where rounding decides between light and dark.
+    let mut nodes = vec![(0.0, 0.0)];
+    for angle in [-60.0, -30.0, 30.0, 60.0] {
+        nodes.extend([(0.0, angle), (angle, 0.0)]);
     }
-    // At the poles of type A the sector of H ends everywhere at once.
-    if goniometer == Goniometer::B {
-        nodes.extend([(0.0, -90.0), (0.0, 90.0)]);
-    }
-    for v in [-30.0, 0.0, 60.0] {
-        nodes.extend([(45.0, v), (-45.0, v)]);
+    for v in [-30.0, 60.0] {
+        nodes.extend([(60.0, v), (-60.0, v), (30.0, v)]);
     }
     let mut directions: Vec<AskedDirection> =
         nodes.into_iter().map(|(h, v)| AskedDirection::native(goniometer, h, v)).collect();
