@@ -10,6 +10,7 @@ use luxproof_process::{files, printable};
 use miette::{IntoDiagnostic, Report as Diagnostic, miette};
 
 use crate::catalogue::PACK_VERSION;
+use crate::explanation::PartialExplanation;
 use crate::judge::{FileJudgement, FileVerdict, Judgement, judge};
 use crate::mistake::Mistake;
 use crate::own_answers::own_submission;
@@ -162,12 +163,20 @@ fn describe(verdict: &FileVerdict) -> String {
         FileVerdict::Factor { factor } => {
             format!("WRONG: all answers are {factor:.4} times the expected, which no known mistake gives")
         }
-        FileVerdict::Unknown { c_deg, gamma_deg, answer_cd, expected_cd: [least, most] } => {
+        FileVerdict::Unknown { c_deg, gamma_deg, answer_cd, expected_cd: [least, most], nearest } => {
             let expected =
                 if most - least <= 1e-6 * most { format!("{least:.3}") } else { format!("{least:.3} to {most:.3}") };
-            format!(
-                "WRONG: {answer_cd:.3} cd at C {c_deg:.1} gamma {gamma_deg:.1}, expected {expected}; no known mistake gives these answers"
-            )
+            let known = match nearest {
+                None => "no known mistake gives these answers".to_owned(),
+                Some(PartialExplanation { mistakes, explained, answered, .. }) if mistakes.is_empty() => {
+                    format!("{explained} of {answered} answers are right")
+                }
+                Some(PartialExplanation { mistakes, explained, answered, .. }) => {
+                    let names = mistakes.iter().map(|mistake| mistake.id()).join(" and ");
+                    format!("{explained} of {answered} answers are those of {names}, which is expected here")
+                }
+            };
+            format!("WRONG: {answer_cd:.3} cd at C {c_deg:.1} gamma {gamma_deg:.1}, expected {expected}; {known}")
         }
         FileVerdict::Refused { reason } => format!("not read: {}", printable::line(reason, MAX_NAME_CHARS)),
         FileVerdict::Unanswered => "no answer".into(),

@@ -1,6 +1,7 @@
 //! Finds the mistakes and variants that give the answers of a reader to one file.
 
 use itertools::Itertools as _;
+use serde::Serialize;
 
 use crate::expected::Flux;
 use crate::mistake::{Mistake, Variant};
@@ -31,6 +32,25 @@ pub(crate) struct Explanation {
     /// The factor of all answers, named or not.
     pub(crate) scale: f64,
 }
+
+/// Mistakes that give most answers to a file, and not all.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartialExplanation {
+    /// The mistakes; none where most answers are right.
+    pub mistakes: Vec<Mistake>,
+    /// The choice of the reader in this file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variant: Option<Variant>,
+    /// The number of answers that they give.
+    pub explained: usize,
+    /// The number of answers.
+    pub answered: usize,
+    /// The factor of all answers.
+    pub scale: f64,
+}
+
+/// The part of the answers that an explanation gives at least, to be worth saying.
+const MIN_EXPLAINED_SHARE: f64 = 0.75;
 
 /// The answers to a file and how far they may be off.
 #[derive(Clone, Copy, Debug)]
@@ -110,6 +130,27 @@ impl Answers<'_> {
         found
     }
 
+    /// The fewest mistakes that give the most answers, where none gives all.
+    pub(crate) fn explain_most(&self, shown: &[Mistake]) -> Option<PartialExplanation> {
+        let mut best: Option<PartialExplanation> = None;
+        for mistakes in (0..=MAX_MISTAKES).flat_map(|count| shown.iter().copied().combinations(count)) {
+            for variant in self.file.variants.iter().copied().map(Some).chain([None]) {
+                let pairs = self.pairs(&ModelReader { mistakes: &mistakes, variant }.predict(self.file));
+                let scale = if self.scale == Scale::Candela { Some(1.0) } else { middle_ratio(&pairs) };
+                let Some(scale) = scale else { continue };
+                let is_met = |(prediction, answer): &&(Prediction, f64)| {
+                    prediction.most.is_finite() && self.is_met(*prediction, *answer, scale)
+                };
+                let explained = pairs.iter().filter(is_met).count();
+                if explained > best.as_ref().map_or(0, |best| best.explained) {
+                    let mistakes = mistakes.clone();
+                    best = Some(PartialExplanation { mistakes, variant, explained, answered: pairs.len(), scale });
+                }
+            }
+        }
+        best.filter(|best| best.explained as f64 >= MIN_EXPLAINED_SHARE * best.answered as f64)
+    }
+
     /// Whether the answers are those of a reader, up to the first that is not: most sets of mistakes fail soon.
     fn agree_with(&self, reader: &ModelReader) -> bool {
         let asked = self.file.directions.iter().zip(reader.predictions(self.file)).zip(self.candela);
@@ -169,6 +210,16 @@ impl Answers<'_> {
     pub(crate) fn allowed_cd(&self, candela: f64) -> f64 {
         self.file.tolerance_cd() + 2.0 * self.relative_uncertainty * candela.abs()
     }
+}
+
+/// The middle ratio of answers and predictions: some wrong answers do not move it.
+fn middle_ratio(pairs: &[(Prediction, f64)]) -> Option<f64> {
+    let ratio = |(prediction, answer): &(Prediction, f64)| {
+        prediction.exact().filter(|expected| *expected > 0.0).map(|expected| answer / expected)
+    };
+    let mut ratios: Vec<f64> = pairs.iter().filter_map(ratio).collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios.get(ratios.len() / 2).copied()
 }
 
 /// The normalisation that multiplies all intensities of a file by this factor.

@@ -1,13 +1,14 @@
 //! Judges a submission: file by file, then by what the files say together.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 use itertools::Itertools as _;
 use serde::Serialize;
 
 use crate::catalogue::{PACK_VERSION, pack_files};
 use crate::expected::mistakes_that_show;
-use crate::explanation::{Answers, Explanation};
+use crate::explanation::{Answers, Explanation, PartialExplanation};
 use crate::interpolation;
 use crate::mistake::{Mistake, Variant};
 use crate::model_reader::ModelReader;
@@ -72,6 +73,9 @@ pub enum FileVerdict {
         answer_cd: f64,
         /// What it should be: the least and the most of the nodes around it.
         expected_cd: [f64; 2],
+        /// Mistakes that give most answers, if there are such.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        nearest: Option<PartialExplanation>,
     },
     /// The reader did not read the file.
     Refused {
@@ -122,31 +126,47 @@ struct ExaminedFile<'a> {
     explanations: Vec<Explanation>,
 }
 
-/// In how many files each mistake explains the answers, and in how many it would show and does not.
+/// What the files say together of each mistake.
 struct Evidence {
-    explained: BTreeMap<Mistake, usize>,
+    /// In how many files it may be the cause.
+    possible: BTreeMap<Mistake, usize>,
+    /// In how many files it would show and does not.
     refuted: BTreeMap<Mistake, usize>,
+    /// Whether the answers to some file have no explanation without it.
+    necessary: BTreeSet<Mistake>,
 }
 
 impl Evidence {
     fn of(files: &[ExaminedFile]) -> Self {
-        let (mut explained, mut refuted) = (BTreeMap::new(), BTreeMap::new());
+        let (mut possible, mut refuted, mut necessary) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
         for file in files.iter().filter(|file| !file.explanations.is_empty()) {
             for mistake in &file.shown {
-                let is_possible = file.explanations.iter().any(|explanation| explanation.mistakes.contains(mistake));
-                let counts = if is_possible { &mut explained } else { &mut refuted };
+                let mut explanations = file.explanations.iter();
+                let count = explanations.clone().filter(|one| one.mistakes.contains(mistake)).count();
+                let counts = if count > 0 { &mut possible } else { &mut refuted };
                 *counts.entry(*mistake).or_insert(0) += 1;
+                if explanations.all(|explanation| explanation.mistakes.contains(mistake)) {
+                    necessary.insert(*mistake);
+                }
             }
         }
-        Self { explained, refuted }
+        Self { possible, refuted, necessary }
     }
 
-    /// Less for what other files contradict less, then for what explains more.
-    fn cost(&self, mistakes: &[Mistake]) -> (usize, std::cmp::Reverse<usize>) {
+    /// Whether a mistake is the cause in some file for sure, and most files agree.
+    fn is_established(&self, mistake: Mistake) -> bool {
+        let count = |counts: &BTreeMap<Mistake, usize>| counts.get(&mistake).copied().unwrap_or(0);
+        self.necessary.contains(&mistake) && count(&self.refuted) < count(&self.possible)
+    }
+
+    /// Less for fewer mistakes that nothing else establishes, then for what other files contradict less, then for what
+    /// explains more.
+    fn cost(&self, mistakes: &[Mistake]) -> (usize, usize, Reverse<usize>) {
         let sum = |counts: &BTreeMap<Mistake, usize>| -> usize {
             mistakes.iter().filter_map(|mistake| counts.get(mistake)).sum()
         };
-        (sum(&self.refuted), std::cmp::Reverse(sum(&self.explained)))
+        let open = mistakes.iter().filter(|mistake| !self.is_established(**mistake)).count();
+        (open, sum(&self.refuted), Reverse(sum(&self.possible)))
     }
 }
 
@@ -193,7 +213,7 @@ impl<'a> ExaminedFile<'a> {
             return FileVerdict::Refused { reason: reason.clone() };
         }
         let Some(answers) = self.answers else { return FileVerdict::Unanswered };
-        let Some(first) = best.first() else { return self.worst_answer(answers, 1.0) };
+        let Some(first) = best.first() else { return self.worst_answer(answers, answers.explain_most(&self.shown)) };
         if !first.mistakes.is_empty() {
             let alternatives = best.iter().map(|explanation| explanation.mistakes.clone()).unique().collect();
             return FileVerdict::Mistakes { alternatives, factor: first.factor };
@@ -237,12 +257,16 @@ impl<'a> ExaminedFile<'a> {
         if between.iter().all(is_near) {
             return Ok(Some(Variant::OtherInterpolation));
         }
-        Err(self.worst_answer(answers, scale))
+        let scaled = PartialExplanation { mistakes: vec![], variant: None, explained: 0, answered: 0, scale };
+        Err(self.worst_answer(answers, Some(scaled)))
     }
 
-    /// The answer with the largest deviation.
-    fn worst_answer(&self, answers: Answers, scale: f64) -> FileVerdict {
-        let predictions = ModelReader::RIGHT.predict(self.file);
+    /// The answer with the largest deviation from what mistakes give that explain most answers.
+    fn worst_answer(&self, answers: Answers, nearest: Option<PartialExplanation>) -> FileVerdict {
+        let mistakes = nearest.as_ref().map(|nearest| nearest.mistakes.as_slice()).unwrap_or_default();
+        let scale = nearest.as_ref().map_or(1.0, |nearest| nearest.scale);
+        let variant = nearest.as_ref().and_then(|nearest| nearest.variant);
+        let predictions = ModelReader { mistakes, variant }.predict(self.file);
         let deviation = |k: usize, answer: f64| {
             let answer = answer / scale;
             (predictions[k].least - answer).max(answer - predictions[k].most)
@@ -252,7 +276,8 @@ impl<'a> ExaminedFile<'a> {
         let Some((k, answer_cd)) = worst else { return FileVerdict::Unanswered };
         let asked = &self.file.directions[k];
         let expected_cd = [predictions[k].least, predictions[k].most].map(|candela| candela * scale);
-        FileVerdict::Unknown { c_deg: asked.c_deg, gamma_deg: asked.gamma_deg, answer_cd, expected_cd }
+        let nearest = nearest.filter(|nearest| nearest.explained > 0);
+        FileVerdict::Unknown { c_deg: asked.c_deg, gamma_deg: asked.gamma_deg, answer_cd, expected_cd, nearest }
     }
 }
 

@@ -34,6 +34,7 @@ pub use catalogue::{PACK_VERSION, pack_files};
 pub use closed_form::ClosedForm;
 pub use command::{ConformanceArgs, run};
 pub use expected::{Axes, Direction, Expected, Flux, MistakeAnswer, VariantAnswer};
+pub use explanation::PartialExplanation;
 pub use judge::{FileJudgement, FileVerdict, Judgement, judge};
 pub use mistake::{Mistake, Variant};
 pub use own_answers::own_submission;

@@ -43,6 +43,7 @@ pub enum Mistake {
     #[serde(rename = "planes-90-270-as-0-180")]
     #[strum(serialize = "planes-90-270-as-0-180")]
     PlanesAbout90From0,
+    HalfOnOtherSide,
     MirrorRepeated,
     MirrorMissing,
     TypeAsC,
@@ -115,6 +116,9 @@ impl Mistake {
             Self::SinglePlaneOnly => "A single plane lights only its own azimuth: it stands for every C.",
             Self::PlanesAbout90From0 => {
                 "Half planes about C 90 - C 270 are placed at 0 to 180: place them at their own angles and mirror left and right."
+            }
+            Self::HalfOnOtherSide => {
+                "Half planes about C 90 - C 270 are placed on the other side: LM-63 stores 90 to 270, EULUMDAT 270 over 0 to 90."
             }
             Self::MirrorRepeated => {
                 "Stored planes are repeated around the circle: they must be mirrored at their first and last plane."

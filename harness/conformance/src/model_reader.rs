@@ -192,6 +192,7 @@ impl ModelReader<'_> {
                 Lookup::At(first + c.min(360.0 - c))
             }
             PlaneLayout::HalfAboutC90 => {
+                let c = if self.makes(Mistake::HalfOnOtherSide) { c + 180.0 } else { c };
                 let along = (c - first).rem_euclid(360.0);
                 let along = if 360.0 - along < SAME_DEG { 0.0 } else { along };
                 if along <= 180.0 + SAME_DEG {

@@ -316,9 +316,10 @@ fn wrong_numbers_besides_the_intensities_are_named() {
 #[test]
 fn answers_that_nothing_explains_are_shown_with_their_direction() {
     let judged = judge_changed("plain.ies", |answer| answer.candela.as_mut().unwrap()[1] = Some(0.5));
-    let FileVerdict::Unknown { c_deg, gamma_deg, answer_cd, expected_cd } = judged.verdict else {
-        panic!("{judged:?}")
+    let FileVerdict::Unknown { c_deg, gamma_deg, answer_cd, expected_cd, nearest } = judged.verdict else {
+        panic!("{:?}", judged.verdict)
     };
+    assert_eq!(nearest.map(|nearest| (nearest.mistakes, nearest.explained, nearest.answered)), Some((vec![], 25, 26)));
     assert_eq!((c_deg, gamma_deg, answer_cd), (0.0, 30.0, 0.5));
     // 500 + 200 sin 30 + 150 cos 30
     assert!((expected_cd[0] - (600.0 + 150.0 * 0.75_f64.sqrt())).abs() < 1e-3 && expected_cd[0] == expected_cd[1]);
@@ -330,6 +331,22 @@ fn answers_that_nothing_explains_are_shown_with_their_direction() {
         *answer = FileAnswer { refused: Some("no".into()), ..FileAnswer::default() };
     });
     assert!(judged.is_fault() && judged.verdict == FileVerdict::Refused { reason: "no".into() });
+}
+
+#[test]
+fn mistakes_that_explain_most_answers_are_named() {
+    let pair = [Mistake::AzimuthReversed, Mistake::TurnedBy90];
+    for scale in [Scale::Candela, Scale::Relative] {
+        let mut answers = Submission { scale, ..submission(&pair, |_| 1.0) };
+        answers.files.retain(|name, _| name == "plain.ies");
+        answers.files.get_mut("plain.ies").unwrap().candela.as_mut().unwrap()[25] = Some(0.0);
+        let judgement = judge(&answers).unwrap();
+        let verdict = &judgement.files[0].verdict;
+        let FileVerdict::Unknown { gamma_deg, nearest: Some(nearest), .. } = verdict else { panic!("{verdict:?}") };
+        // A mirror and a turn are a turn back and the mirror.
+        assert!(nearest.mistakes.contains(&Mistake::AzimuthReversed) && nearest.mistakes.len() == 2, "{nearest:?}");
+        assert_eq!((nearest.explained, nearest.answered, *gamma_deg), (25, 26, 180.0));
+    }
 }
 
 #[test]

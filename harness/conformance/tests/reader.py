@@ -203,7 +203,7 @@ def fold(table, kind, h, wrong):
     # From 90 to 270, or from -90 to 90.
     if wrong == "planes-90-270-as-0-180":
         return first + min(h, 360 - h)
-    along = (h - first) % 360
+    along = (h + (180 if wrong == "half-on-other-side" else 0) - first) % 360
     along = 0.0 if 360 - along < TINY else along
     if along <= 180 + TINY:
         return first + along

@@ -58,7 +58,8 @@ impl Default for Lm63 {
             third_number: 1.0,
             tilt: Tilt::None,
             is_in_feet: false,
-            dimensions: [0.2, 0.5, 0.0],
+            // A point: renderers that light from the opening answer the intensities themselves.
+            dimensions: [0.0; 3],
             layout: Layout::Usual,
         }
     }
