@@ -234,6 +234,7 @@ impl Running<'_> {
             method: measurement.method,
             effort: measurement.effort,
             role: planned.engine.role(),
+            reads_files: planned.engine.reads_files(&run.job),
             approximation: run.approximation.clone(),
             declared_error: Some(run.declared).filter(|error| *error > 0.0),
             notes: measurement.notes,

@@ -35,6 +35,9 @@ pub struct Capability {
     pub title: String,
     /// The question that its cell answers.
     pub question: String,
+    /// Whether only engines count that parse the photometric file themselves.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reads_files: bool,
     /// All count: the worst decides.
     pub cases: Vec<CaseSelector>,
     /// With fewer public cases that have values, a cell says `not tested`, unless one of them is wrong.

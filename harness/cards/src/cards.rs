@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use itertools::Itertools;
-use luxproof_model::{EngineName, HiddenVariant, ProcedureId, Report, Role, Status, ToleranceClass, Tool};
+use luxproof_model::{EngineName, HiddenVariant, ProcedureId, Report, Request, Role, Status, ToleranceClass, Tool};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ pub struct Cards {
     pub luxproof_cards: u32,
     pub tool: Tool,
     pub capabilities: Capabilities,
-    /// By name.
+    /// By name, luxproof's own solvers last.
     pub renderers: Vec<RendererCard>,
     /// The runs behind the cells, the newest first.
     pub runs: Vec<CardRun>,
@@ -122,9 +122,8 @@ pub struct CardRun {
     pub title: String,
     pub started: String,
     pub tool: Tool,
-    pub seed: u64,
-    /// The command of the run.
-    pub command: Option<String>,
+    /// What it was asked for; with its specs it repeats the run.
+    pub request: Option<Request>,
     /// Its HTML report on the site, relative to the root of the site.
     pub report: Option<String>,
     /// Its bundle on the site, likewise.
@@ -150,19 +149,22 @@ pub enum Verification {
 }
 
 impl CardRun {
+    /// The command that repeats these specs with one engine of the run.
+    pub fn command(&self, specs: &[String], engine: &EngineName) -> Option<String> {
+        let request = self.request.clone().filter(|_| !specs.is_empty())?;
+        Some(Request { engines: vec![engine.to_string()], filter: vec![], ..request }.command(specs))
+    }
+
     /// The record of a report.
     ///
     /// The caller adds what of it lies on the site.
     pub fn of(report: &Report, verification: Verification) -> Self {
-        let specs = report.cases.iter().filter(|case| !case.is_calibration).map(|case| case.spec.path.clone());
-        let specs: Vec<String> = specs.unique().collect();
         Self {
             id: RunId::of(report),
             title: report.spec.title.clone(),
             started: report.started.clone(),
             tool: report.tool.clone(),
-            seed: report.request.as_ref().map_or(1, |request| request.seed),
-            command: report.request.as_ref().map(|request| request.command(&specs)),
+            request: report.request.clone(),
             report: None,
             bundle: None,
             verification,
@@ -241,7 +243,8 @@ impl Cards {
             let is_own = own.contains(&name);
             renderer_card(name, is_own, releases, capabilities, &mut pages)
         });
-        let renderers = cards.collect();
+        // Renderers before luxproof's own solvers, which judge them.
+        let renderers = cards.sorted_by_key(|card: &RendererCard| card.is_own).collect();
         let runs: Vec<CardRun> =
             runs.iter().map(|(run, _)| run.clone()).sorted_by(|a, b| b.started.cmp(&a.started)).collect();
         let cases = runs_cases(&pages);
@@ -429,7 +432,7 @@ mod tests {
         let change = &mitsuba.releases[2].changes[0];
         assert_eq!(
             (change.before.as_str(), change.from.as_str(), change.to.as_str()),
-            ("3.5.2", "within 0.3 %", "wrong, up to 31 %")
+            ("3.5.2", "within 0.30 %", "wrong, up to 31 %")
         );
         assert_eq!(pages.len(), 1);
         assert_eq!(pages[0].releases.len(), 4);

@@ -114,7 +114,7 @@ impl Standing {
         }
     }
 
-    /// The cell in a few words: `within 0.84 %`, `off by up to 12 %`, `not tested`.
+    /// The cell in a few words: `within 0.84 %`, `wrong, up to 12 %`, `not tested`.
     pub fn headline(&self) -> String {
         match self {
             Self::Accurate { worst: Some(worst) } => format!("within {}", worst.bound_text()),
@@ -199,7 +199,7 @@ impl CaseEvidence {
             }
             Outcome::Measured(measurement) => {
                 let remarks = measurement.remarks.iter();
-                remarks.filter_map(|remark| Flaw::of_limit(self, remark, measurement)).collect()
+                remarks.filter_map(|remark| Flaw::of_limit(self, remark)).collect()
             }
             Outcome::Failed { .. } | Outcome::NotRun { .. } => vec![],
         }
@@ -221,17 +221,14 @@ impl<'a> Flaw<'a> {
         Some(Self { case, text, worst: *worst, at: at.clone() })
     }
 
-    fn of_limit(case: &'a CaseEvidence, remark: &Remark, measurement: &Measurement) -> Option<Self> {
-        match remark {
-            Remark::Fault { .. } => None,
-            Remark::Limit { text, worst, at, .. } => {
-                Some(Self { case, text: text.clone(), worst: *worst, at: at.clone() })
-            }
-            Remark::Undecided { points, worst, at } => {
-                let text = format!("undecided at {points} of {}", plural(measurement.verdicts.all, "point"));
-                Some(Self { case, text, worst: *worst, at: at.clone() })
-            }
-        }
+    /// A limit by its name; undecided points have none.
+    fn of_limit(case: &'a CaseEvidence, remark: &Remark) -> Option<Self> {
+        let (text, worst, at) = match remark {
+            Remark::Fault { .. } => return None,
+            Remark::Limit { text, worst, at, .. } => (text.clone(), worst, at),
+            Remark::Undecided { worst, at, .. } => (String::new(), worst, at),
+        };
+        Some(Self { case, text, worst: *worst, at: at.clone() })
     }
 
     fn bound(&self) -> f64 {
@@ -241,14 +238,24 @@ impl<'a> Flaw<'a> {
 
 /// The flaw with the largest bound, and where all of them are.
 fn gravest<'a>(flaws: Vec<Flaw<'a>>, evidence: &[CaseEvidence]) -> Option<(Flaw<'a>, String)> {
-    let cases: Vec<String> = flaws.iter().map(|flaw| place(flaw.case)).unique().collect();
-    let run = evidence.iter().filter(|e| !matches!(e.outcome, Outcome::NotRun { .. })).map(place).unique().count();
-    let worst = flaws.into_iter().max_by(|a, b| a.bound().total_cmp(&b.bound()))?;
-    let at = worst.at.as_ref().map(|at| format!(", worst at {at} of {}", place(worst.case))).unwrap_or_default();
+    let cases: Vec<&str> = flaws.iter().map(|flaw| flaw.case.case.as_str()).unique().collect();
+    let run = evidence.iter().filter(|e| !matches!(e.outcome, Outcome::NotRun { .. }));
+    let run = run.map(|e| e.case.as_str()).unique().count();
+    let [public, hidden] =
+        [false, true].map(|is_hidden| flaws.iter().any(|flaw| flaw.case.hidden.is_some() == is_hidden));
+    let variants = match (public, hidden) {
+        (true, true) => ", hidden variants too",
+        (false, true) => ", in hidden variants only",
+        (_, false) => "",
+    };
+    let worst = flaws.iter().map(Flaw::bound).position_max_by(f64::total_cmp);
     let listed = cases.iter().take(LISTED_CASES).join(", ");
     let more = cases.len().saturating_sub(LISTED_CASES);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    Some((worst, format!("in {} of {}: {listed}{more}{at}", cases.len(), plural(run, "case"))))
+    let count = cases.len();
+    let worst = flaws.into_iter().nth(worst?)?;
+    let at = worst.at.as_ref().map(|at| format!("; worst at {at} of {}", place(worst.case))).unwrap_or_default();
+    Some((worst, format!("in {count} of {}: {listed}{more}{variants}{at}", plural(run, "case"))))
 }
 
 /// The name of a case; a hidden variant says so.
@@ -303,10 +310,18 @@ fn without_values(
     Some(Standing::NotTested { reason: [vec![count], reasons].concat().join("; ") })
 }
 
+/// A cell that something limits. What has a name comes before points that more samples would decide.
 fn limited(evidence: &[CaseEvidence]) -> Option<Standing> {
-    let limits = evidence.iter().flat_map(CaseEvidence::limits).collect();
-    let (worst, from) = gravest(limits, evidence)?;
-    Some(Standing::Limited { what: worst.text, from, worst: worst_of(evidence.iter()) })
+    let undecided = evidence.iter().filter_map(CaseEvidence::measurement).map(|m| m.verdicts.undecided).sum::<usize>();
+    let all = evidence.iter().filter_map(CaseEvidence::measurement).map(|m| m.verdicts.all).sum::<usize>();
+    let undecided = (undecided > 0).then(|| format!("{undecided} of {} undecided", plural(all, "point")));
+    let (named, open): (Vec<_>, Vec<_>) =
+        evidence.iter().flat_map(CaseEvidence::limits).partition(|flaw| !flaw.text.is_empty());
+    let (what, from) = match gravest(named, evidence) {
+        Some((worst, from)) => ([Some(worst.text), undecided].into_iter().flatten().join("; "), from),
+        None => (undecided.unwrap_or_default(), gravest(open, evidence)?.1),
+    };
+    Some(Standing::Limited { what, from, worst: worst_of(evidence.iter()) })
 }
 
 /// The deviation with the largest bound.
@@ -367,7 +382,7 @@ mod tests {
         // .004 + .003 is more than .006 + .0005.
         assert!((bound(&found) - 0.007).abs() < 1e-12);
         assert_eq!((found.points, found.tested_cases, found.all_cases), (4, 3, 3));
-        assert_eq!(found.standing.headline(), "within 0.7 %");
+        assert_eq!(found.standing.headline(), "within 0.70 %");
     }
 
     #[test]
@@ -389,7 +404,7 @@ mod tests {
     fn an_undecided_point_is_never_accurate() {
         let found = cell(&three(MadeCase::new("a").off(0.0, 0.0).off(0.008, 0.005)), 3);
         let Standing::Limited { what, .. } = &found.standing else { panic!("{found:?}") };
-        assert_eq!(what, "undecided at 1 of 2 points");
+        assert_eq!(what, "1 of 4 points undecided");
         assert!((bound(&found) - 0.013).abs() < 1e-12);
     }
 
@@ -444,7 +459,7 @@ mod tests {
         let Standing::Limited { what, from, worst } = &limited.standing else { panic!("{limited:?}") };
         assert_eq!(
             (what.as_str(), from.as_str()),
-            ("20 reflections at most", "in 1 of 3 cases: a, worst at floor[0] of a")
+            ("20 reflections at most", "in 1 of 3 cases: a; worst at floor[0] of a")
         );
         assert!((worst.unwrap().bound() - 0.121).abs() < 1e-12);
         let wrong = cell_of(&known("fault"), 3);
@@ -483,6 +498,31 @@ mod tests {
     }
 
     #[test]
+    fn who_reads_files_is_judged_by_its_own_parser_and_not_by_that_of_luxproof() {
+        let mut capability = capabilities(2).capabilities[0].clone();
+        capability.reads_files = true;
+        let judged = |report: &Report| {
+            let evidence =
+                ReportIndex::new(report).evidence(&capability, &EngineName::from(ENGINE), &RunId::of(report));
+            judge(&capability, &evidence).standing
+        };
+        let mut report = report(ENGINE, "1.0", &three(MadeCase::new("a").off(0.0, 0.0)));
+        let Standing::NotSupported { reason } = judged(&report) else { panic!("{:?}", judged(&report)) };
+        assert!(reason.contains("luxproof reads it"), "{reason}");
+        report.recordings.iter_mut().for_each(|recording| recording.reads_files = true);
+        assert!(matches!(judged(&report), Standing::Accurate { .. }));
+        // A file that it rejects gives no wrong light; the place of its log is not published.
+        for recording in &mut report.recordings {
+            recording.failure =
+                Some("ies2rad failed: unsupported type\nall its messages are in /home/me/log".to_owned());
+            recording.failure_kind = Some(luxproof_model::FailureKind::Crash);
+        }
+        let rejected =
+            Standing::NotSupported { reason: "it rejects the file: ies2rad failed: unsupported type".to_owned() };
+        assert_eq!(judged(&report), rejected);
+    }
+
+    #[test]
     fn a_reference_by_another_engine_or_a_hand_method_judges_nothing() {
         for basis in [Basis::Engine, Basis::Iesna] {
             let a = MadeCase::new("a").judged(0.3, 0.0, Verdict::Fail, None).with_reference(0.0, basis);
@@ -502,7 +542,7 @@ mod tests {
         let found = cell(&given, 3);
         let Standing::Wrong { fault, from, .. } = &found.standing else { panic!("{found:?}") };
         assert!(fault.starts_with("right in the public cases only"), "{fault}");
-        assert!(from.contains("a (hidden, seed 7)"), "{from}");
+        assert_eq!(from, "in 1 of 3 cases: a, in hidden variants only; worst at floor[0] of a (hidden, seed 7)");
         let spread = found.spread.unwrap();
         assert!(spread.is_public_only);
         assert_eq!(spread.seeds, [7]);

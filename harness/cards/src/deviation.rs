@@ -77,7 +77,7 @@ fn rounded_up(value: f64) -> String {
     let scale = 10f64.powf(decimals);
     // Rounding noise of the product must not add a digit.
     let up = (value * scale * (1.0 - 1e-12)).ceil() / scale;
-    luxproof_model::numbers::trimmed(up, decimals as usize)
+    format!("{up:.*}", decimals as usize)
 }
 
 /// `+0.61 % ± 0.23 %`, or `+0.12 ± 0.05 UGR`.
@@ -120,8 +120,8 @@ mod tests {
             (0.00121, "0.0013"),
             (0.84, "0.84"),
             (0.841, "0.85"),
-            (1.0, "1"),
-            (9.96, "10"),
+            (1.0, "1.0"),
+            (9.96, "10.0"),
             (12.3, "13"),
             (1689.3, "1690"),
         ] {

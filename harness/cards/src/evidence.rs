@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use itertools::Itertools;
 use luxproof_model::{
     Basis, CaseRecord, Comparison, DeviationKind, EngineName, FailureKind, HiddenVariant, ProcedureId, ReadingKey,
-    Recording, Report, SkipCause, Verdict,
+    Recording, Report, Role, SkipCause, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,8 @@ pub struct CaseEvidence {
     /// The name of the case in its report.
     pub reported_as: String,
     pub title: String,
+    /// The path of its spec, as it was given.
+    pub spec: String,
     pub procedure: ProcedureId,
     /// Null for a public case.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -135,12 +137,13 @@ impl<'a> ReportIndex<'a> {
             let case = case_name(record);
             for procedure in capability.cases.iter().filter(|s| s.case == case).flat_map(|s| &s.procedures) {
                 let key = ReadingKey::new(&record.name, *procedure, engine.clone());
-                let Some(outcome) = self.outcome(&key) else { continue };
+                let Some(outcome) = self.outcome(&key, capability) else { continue };
                 let recording = self.recordings.get(&key);
                 found.push(CaseEvidence {
                     case: case.to_owned(),
                     reported_as: record.name.clone(),
                     title: record.spec.title.clone(),
+                    spec: record.spec.path.clone(),
                     procedure: *procedure,
                     hidden: record.hidden_variant.clone(),
                     run: run.clone(),
@@ -155,15 +158,15 @@ impl<'a> ReportIndex<'a> {
     }
 
     /// What came of a job; `None` where the run did not ask for it.
-    fn outcome(&self, key: &ReadingKey) -> Option<Outcome> {
+    fn outcome(&self, key: &ReadingKey, capability: &Capability) -> Option<Outcome> {
         let Some(recording) = self.recordings.get(key) else { return self.skipped(key) };
+        // Somebody ran recorded programs with the files themselves.
+        if capability.reads_files && !recording.reads_files && recording.role != Role::Recorded {
+            let reason = "it reads no photometric file here: luxproof reads it and passes the table on".to_owned();
+            return Some(Outcome::Unsupported { reason });
+        }
         if let Some(reason) = &recording.failure {
-            let reason = reason.clone();
-            return Some(match recording.failure_kind {
-                Some(FailureKind::Declined) => Outcome::Unsupported { reason },
-                Some(kind) if !kind.is_an_answer() => Outcome::NotRun { reason },
-                _ => Outcome::Failed { reason },
-            });
+            return Some(failed(recording.failure_kind, public_text(reason), capability));
         }
         let judged = self.comparisons.get(key).into_iter().flatten().copied().filter(|c| is_judge(c));
         let judged: Vec<&Comparison> = judged.collect();
@@ -251,6 +254,24 @@ impl<'a> ReportIndex<'a> {
         }
         remarks
     }
+}
+
+/// The outcome of a job without usable values.
+fn failed(kind: Option<FailureKind>, reason: String, capability: &Capability) -> Outcome {
+    match kind {
+        Some(FailureKind::Declined) => Outcome::Unsupported { reason },
+        Some(kind) if !kind.is_an_answer() => Outcome::NotRun { reason },
+        // It said so: a user gets no wrong light.
+        Some(FailureKind::Crash | FailureKind::Refused) if capability.reads_files => {
+            Outcome::Unsupported { reason: format!("it rejects the file: {reason}") }
+        }
+        _ => Outcome::Failed { reason },
+    }
+}
+
+/// The message of an engine in one line, without the place of its log on the machine that ran it.
+fn public_text(reason: &str) -> String {
+    reason.lines().filter(|line| !line.starts_with("all its messages are in ")).join("; ")
 }
 
 /// The name of a case in capabilities.

@@ -50,7 +50,7 @@ impl MadeCase {
         self
     }
 
-    /// A point of 100 lx whose relative deviation has an expanded uncertainty; the verdict follows from the interval.
+    /// A point of 100 lx with a relative deviation and its expanded uncertainty; the verdict follows from the interval.
     pub(crate) fn off(self, deviation: f64, expanded: f64) -> Self {
         let size = deviation.abs();
         let verdict = match () {

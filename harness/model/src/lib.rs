@@ -238,6 +238,9 @@ pub struct Recording {
     /// Blocks, samples, seeds and commands.
     #[serde(default)]
     pub effort: Effort,
+    /// Whether its own parser read the photometric files; otherwise it got the tables that luxproof parsed.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reads_files: bool,
     /// How the engine only approximates the request.
     pub approximation: Option<String>,
     /// The engine's declared error by that approximation, relative to the reading.
@@ -304,6 +307,7 @@ impl Recording {
             seed: 1,
             method: Method::default(),
             effort: Effort::default(),
+            reads_files: false,
             approximation: None,
             declared_error: None,
             notes: vec![],

@@ -1,7 +1,8 @@
 //! The page of a renderer and a capability: for each release the cases, their worst points, and how to repeat them.
 
+use itertools::Itertools;
 use luxproof_model::numbers::{plural, significant};
-use luxproof_report::minus;
+use luxproof_report::{minus, table};
 use maud::{Markup, html};
 
 use super::renderer_page::{crumb, crumb_link};
@@ -9,10 +10,12 @@ use super::{frame, plot, sign};
 use crate::cards::anchor;
 use crate::{
     Capability, CardRun, Cards, CaseEvidence, CellEvidence, Deviation, Measurement, Outcome, ReleaseEvidence, Remark,
-    RunId, Spread, Verification,
+    Spread, Verification,
 };
 
 const ROOT: &str = "../../";
+/// What reports give as the spec of scenes of known answer.
+const BUILT_IN: &str = "(built in)";
 
 pub(super) fn page(cards: &Cards, capability: &Capability, of: &CellEvidence) -> Markup {
     let heading = format!("{}: {}", of.renderer, capability.title);
@@ -59,7 +62,10 @@ fn release_section(cards: &Cards, release: &ReleaseEvidence, is_newest: bool) ->
                     summary { "Evidence of " (release.release) }
                     (plot::deviations(&release.cases))
                     (case_table(release))
-                    @for case in &release.cases { (points(case)) }
+                    details {
+                        summary { "Worst points, case by case" }
+                        @for case in &release.cases { (points(release, case)) }
+                    }
                     (repeat(cards, release))
                 }
             }
@@ -92,8 +98,7 @@ fn case_table(release: &ReleaseEvidence) -> Markup {
                         tr {
                             th scope="row" {
                                 (case.case)
-                                @if let Some(variant) = &case.hidden { " " span.tag { "hidden, seed " (variant.seed) } }
-                                span.title { (case.title) }
+                                @if let Some(variant) = &case.hidden { " " span.tag { "hidden, seed " (variant.seed) } } @else { span.title { (case.title) } }
                             }
                             td { (case.procedure.title()) }
                             (outcome_cells(case))
@@ -135,48 +140,47 @@ fn result(measurement: &Measurement) -> Markup {
     }
 }
 
-/// The points of a case with the largest bounds.
-fn points(case: &CaseEvidence) -> Markup {
+/// The points of a case with the largest bounds, and the command behind them.
+fn points(release: &ReleaseEvidence, case: &CaseEvidence) -> Markup {
+    const HEADS: [&str; 6] =
+        ["point", "number value", "number reference", "number deviation", "verdict", "reference by"];
     let Outcome::Measured(measurement) = &case.outcome else { return html! {} };
+    let hidden = case.hidden.as_ref().map(|variant| format!(" (hidden, seed {})", variant.seed)).unwrap_or_default();
+    let label = format!("{}{hidden}, {}", case.case, case.procedure.title().to_lowercase());
     html! {
         @if !measurement.points.is_empty() {
-            details {
-                summary { "Worst points of " (case.case) @if let Some(variant) = &case.hidden { " (hidden, seed " (variant.seed) ")" } ", " (case.procedure.title().to_lowercase()) }
-                div.scroll tabindex="0" role="region" aria-label={ "Worst points of " (case.reported_as) } {
-                    table {
-                        thead { tr { th scope="col" { "point" } th.number scope="col" { "value" } th.number scope="col" { "reference" } th.number scope="col" { "deviation" } th scope="col" { "verdict" } th scope="col" { "reference by" } } }
-                        tbody {
-                            @for point in &measurement.points {
-                                tr {
-                                    th scope="row" { (point.meter) }
-                                    td.number { (significant(point.value)) " " (point.unit) }
-                                    td.number { (significant(point.reference)) " " (point.unit) }
-                                    td.number { (point.deviation) }
-                                    td { (point.verdict.name()) }
-                                    td { (point.source) }
-                                }
-                            }
-                        }
+            h4 { (label) }
+            (table(&format!("{}: {label}, {}", release.release, case.reported_as), &HEADS, &html! {
+                @for point in &measurement.points {
+                    tr {
+                        th scope="row" { (point.meter) }
+                        td.number { (significant(point.value)) " " (point.unit) }
+                        td.number { (significant(point.reference)) " " (point.unit) }
+                        td.number { (point.deviation) }
+                        td { (point.verdict.name()) }
+                        td { (point.source) }
                     }
                 }
-                @if let Some(command) = &case.command { p { "By hand:" } pre.commands tabindex="0" { code { (command) } } }
-            }
+            }))
+            @if let Some(command) = &case.command { p { "By hand:" } pre.commands tabindex="0" { code { (command) } } }
         }
     }
 }
 
-/// The runs behind a release, with their commands, reports and bundles.
+/// The runs behind a release, with commands, reports and bundles.
 fn repeat(cards: &Cards, release: &ReleaseEvidence) -> Markup {
-    let mut ids: Vec<&RunId> = release.cases.iter().map(|case| &case.run).collect();
-    ids.sort();
-    ids.dedup();
+    let ids = release.cases.iter().map(|case| &case.run).unique().collect_vec();
     html! {
         h3 { "Check it" }
-        @for run in cards.runs.iter().filter(|run| ids.contains(&&run.id)) { (run_entry(run)) }
+        @for run in cards.runs.iter().filter(|run| ids.contains(&&run.id)) { (run_entry(run, release)) }
     }
 }
 
-fn run_entry(run: &CardRun) -> Markup {
+fn run_entry(run: &CardRun, release: &ReleaseEvidence) -> Markup {
+    let cases = release.cases.iter().filter(|case| case.run == run.id).collect_vec();
+    // Scenes of known answer have no spec: every run has them.
+    let specs = cases.iter().filter(|case| case.spec != BUILT_IN).map(|case| case.spec.clone()).unique().collect_vec();
+    let command = cases.first().and_then(|case| run.command(&specs, &case.engine));
     html! {
         p {
             "Run of " (run.started.replace('T', " ").replace('Z', " UTC")) " by luxproof " (run.tool) ". "
@@ -187,15 +191,11 @@ fn run_entry(run: &CardRun) -> Markup {
                 }
             }
             @if let Some(report) = &run.report { a href={ (ROOT) (report) } { "Full report with every point and plan" } ". " }
-            @if let Some(bundle) = &run.bundle { a href={ (ROOT) (bundle) } { "Bundle" } " with all inputs." }
-        }
-        @if let Some(command) = &run.command {
-            pre.commands tabindex="0" {
-                code {
-                    (command)
-                    @if let Some(bundle) = &run.bundle { "\nluxproof reproduce " (bundle.rsplit('/').next().unwrap_or(bundle)) " # the same from the bundle" }
-                }
+            @if let Some(bundle) = &run.bundle {
+                a href={ (ROOT) (bundle) } { "Bundle" } " with all inputs; "
+                code { "luxproof reproduce " (bundle.rsplit('/').next().unwrap_or(bundle)) } " repeats the whole run."
             }
         }
+        @if let Some(command) = command { p { "These cases with this renderer:" } pre.commands tabindex="0" { code { (command) } } }
     }
 }

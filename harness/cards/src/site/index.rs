@@ -138,12 +138,17 @@ fn matrix_cell(renderer: &RendererCard, cell: &CellCard) -> Markup {
             a.cell href=(cell.page) {
                 (sign(standing)) " " (cell.headline)
                 @if let Standing::Wrong { fault: text, .. } | Standing::Limited { what: text, .. } = standing {
-                    span.why { (shortened(text, SHOWN_LETTERS)) }
+                    span.why { (shortened(first_clause(text), SHOWN_LETTERS)) }
                 }
                 @if let Some(since) = &cell.since { span.since { "since " (shortened(since.as_str(), 16)) } }
             }
         }
     }
+}
+
+/// A text up to its evidence: diagnoses have it behind a colon.
+fn first_clause(text: &str) -> &str {
+    text.split_once(": that explains").map_or(text, |(clause, _)| clause)
 }
 
 /// What hidden variants are, and their seeds.

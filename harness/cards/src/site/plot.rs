@@ -99,6 +99,9 @@ fn tick_text(value: f64, measure: Measure) -> String {
 }
 
 fn name(case: &CaseEvidence) -> String {
+    if case.procedure.is_calibration() {
+        return super::shortened(case.procedure.short(), NAME_LETTERS);
+    }
     let hidden = if case.hidden.is_some() { ", hidden" } else { "" };
     super::shortened(&format!("{}{hidden}", case.case), NAME_LETTERS)
 }

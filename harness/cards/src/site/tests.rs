@@ -81,7 +81,7 @@ fn a_cell_has_a_sign_a_text_and_a_class_and_leads_to_the_evidence_of_its_release
     );
     assert!(cell.contains("href=\"renderers/rays/direct.html#r-2.0\"") && cell.contains("since 2.0"), "{cell}");
     let evidence = content(&files, "renderers/rays/direct.html");
-    for text in ["floor[0]", "150.000 lx", "100.000 lx", "+50.00 ± 0.10 %", "hidden, seed 7", "within 0.2 %"] {
+    for text in ["floor[0]", "150.000 lx", "100.000 lx", "+50.00 ± 0.10 %", "hidden, seed 7", "within 0.20 %"] {
         assert!(evidence.contains(text), "no {text}");
     }
 }

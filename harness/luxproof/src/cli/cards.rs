@@ -1,7 +1,7 @@
 //! `luxproof cards`: the site of score cards, submissions to it, and hidden variants.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -184,11 +184,11 @@ fn write_site(
         for source in &sources {
             let place = folder.join(RUNS).join(source.run.id.as_str());
             fs::create_dir_all(&place)?;
-            fs::copy(&source.file, place.join(REPORT_FILE))?;
+            copy_shared(&source.file, &place.join(REPORT_FILE))?;
             let page = luxproof_report::page(&source.report, &[]);
             luxproof_report::keep_page(&source.report, &page, &place).map_err(io::Error::other)?;
             if let Some(zip) = packed.get(&source.run.id) {
-                fs::copy(zip, place.join(BUNDLE))?;
+                copy_shared(zip, &place.join(BUNDLE))?;
             }
         }
         Ok(())
@@ -201,6 +201,11 @@ fn write_site(
 fn write_shared(path: &Path, bytes: &[u8]) -> io::Result<()> {
     path.parent().map_or(Ok(()), fs::create_dir_all)?;
     fs::write(path, bytes)
+}
+
+/// Copies a file for everybody to read, whoever may read the original.
+fn copy_shared(from: &Path, to: &Path) -> io::Result<()> {
+    io::copy(&mut File::open(from)?, &mut File::create(to)?).map(drop)
 }
 
 /// Packs the bundle of a run; whether there is one. A run that cannot be packed is on the site without.
