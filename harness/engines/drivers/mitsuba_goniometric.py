@@ -25,10 +25,12 @@ import numpy as np
 
 # A direction in 32-bit floats is known to about this angle; the last angles of a table count as inside within it.
 EDGE_DEG = 5e-5
+# How far from the opening a ray starts, in parts of its coordinates.
+CLEAR = 1e-6
 
 
 class Goniometric(mi.Emitter):
-    """The emitter; nothing but next-event estimation reaches it."""
+    """The emitter; paths reach it by next-event estimation, and particles start from it."""
 
     def __init__(self, props):
         mi.Emitter.__init__(self, props)
@@ -73,7 +75,17 @@ class Goniometric(mi.Emitter):
         return mi.Spectrum(0)
 
     def sample_ray(self, time, wavelength_sample, sample_2, sample_3, active=True):
-        raise NotImplementedError("goniometric: light cannot be traced from the emitter")
+        """A ray from a part of the opening in any direction, for integrators that trace light from the emitter."""
+        part, area = self.opening.part(sample_2.x, sample_2.y)
+        own = mi.warp.square_to_uniform_sphere(sample_3)
+        world = lambda v: sum((axis * x for axis, x in zip(self.axes, v)), mi.Vector3f(0))
+        d = world((own.x, own.y, own.z))
+        start = self.position + world(part)
+        # Clear of a surface that the opening lies on.
+        reach = dr.maximum(dr.maximum(dr.abs(start.x), dr.abs(start.y)), dr.abs(start.z))
+        ray = mi.Ray3f(start + d * (CLEAR * (1 + reach)), d)
+        ray.time = time
+        return ray, mi.Spectrum(4 * math.pi * self.opening.share(area, own) * self.intensity(d, active))
 
     def bbox(self):
         # Invalid on purpose, as for Mitsuba's own `point`: it does not enlarge the scene.

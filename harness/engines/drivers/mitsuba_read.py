@@ -5,19 +5,24 @@
 
 Meters are no part of the scene, so nothing disturbs the light. Direct light is what `Scene.sample_emitter_direction`
 gives at a meter, which is exact for point sources. Indirect light is E = pi x the mean radiance that the scene's own
-integrator returns along cosine-distributed rays, first directions stratified. Sums are in 64-bit floats, since a film
+integrator returns along cosine-distributed rays, first directions stratified; `ptracer` sends particles instead. Sums are in 64-bit floats, since a film
 adds up in 32. It reads in blocks of samples, of direct light a meter and emitter: see blocks.py.
 """
 
 import os
 import sys
+import types
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, HERE)
 import blocks
+
+# Read now: jobs may follow whose own folder is another, when this one is gone.
+SOURCES = {name: open(os.path.join(HERE, f"{name}.py"), encoding="utf-8").read() for name in ("mitsuba_goniometric", "mitsuba_meters")}
 
 CLEAR = 1e-6  # of coordinates: how far off a meter its shadow rays start
 SHADOW_EPSILON = 9e-4  # of distances: how far before an emitter they end, as Mitsuba's own do
@@ -37,9 +42,17 @@ def instrument(job, folder, options):
     if is_jit():
         dr.set_thread_count(options.threads)
         dr.flush_malloc_cache()  # of an earlier job
-    import mitsuba_goniometric  # registers the emitters, for the variant just set
-
+    plugins("mitsuba_goniometric")
     return Instrument(load(os.path.join(folder, job["scene"])), job, options.threads)
+
+
+def plugins(name, known={}):
+    """The file of plugins of this name, which registers them for the variant that is set; each job may set another."""
+    if (name, mi.variant()) not in known:
+        module = types.ModuleType(f"{name}_{mi.variant()}")
+        exec(compile(SOURCES[name], f"{name}.py", "exec"), module.__dict__)
+        known[name, mi.variant()] = module
+    return known[name, mi.variant()]
 
 
 def load(scene):
@@ -70,7 +83,8 @@ class Instrument(blocks.Instrument):
             rays = meters.count * emitters
             self.parts["direct"] = blocks.one_by_one(lambda m, seed: direct(scene, meters, emitters, m, seed)), rays
         if job["transport"] in ("indirect", "total") and emitters and scene.shapes():
-            self.parts["indirect"] = blocks.one_by_one(lambda m, seed: indirect(scene, meters, m, seed)), meters.count
+            reflected = particles if job["integrator"] == "ptracer" else indirect
+            self.parts["indirect"] = blocks.one_by_one(lambda m, seed: reflected(scene, meters, m, seed)), meters.count
 
     def blocks(self, part, m, seeds):
         if is_jit():
@@ -182,6 +196,20 @@ def indirect(scene, meters, m, seed):
     return total
 
 
+def particles(scene, meters, m, seed):
+    """Light reflected at least once: m x m particles a meter from the emitters, connected with a meter at each reflection."""
+    sensor = plugins("mitsuba_meters").sensor(meters.positions + meters.offset * meters.normals, meters.normals)
+    random = generator(seed, 0)
+    total, left = np.zeros(meters.count), m * m
+    while left > 0:
+        count = min(left, max(1, Instrument.lanes // meters.count))
+        number = int(random.integers(2**32))
+        image = mi.render(scene, sensor=sensor, integrator=scene.integrator(), spp=count, seed=number)
+        total += count * np.array(image, np.float64).reshape(-1)
+        left -= count
+    return total / (m * m)
+
+
 def trace(scene, p, d, seed):
     """Radiance that the scene's integrator finds along rays; the emitters have no body to be seen at first hand."""
     sampler = mi.load_dict({"type": "independent"})
@@ -192,7 +220,10 @@ def trace(scene, p, d, seed):
         except TypeError:  # Mitsuba before 3.6 takes plain numbers alone.
             sampler.seed(seed, len(p))
         ray = mi.RayDifferential3f(mi.Point3f(*columns(p)), mi.Vector3f(*columns(d)))
-        radiance, _, _ = integrator.sample(scene, sampler, ray)
+        if isinstance(integrator, mi.ad.integrators.common.ADIntegrator):
+            radiance = integrator.sample(dr.ADMode.Primal, scene, sampler, ray, None, None, mi.Bool(True))[0]
+        else:
+            radiance = integrator.sample(scene, sampler, ray)[0]
         return np.array(radiance[0], np.float64)
     sampler.seed(seed, 1)
     found = np.zeros(len(p))

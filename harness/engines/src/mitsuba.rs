@@ -6,6 +6,8 @@ mod settings;
 #[cfg(test)]
 pub(super) mod tests;
 
+use std::path::Path;
+
 use glam::DVec3;
 use luxproof_scene::contact;
 use luxproof_scene::geometry::{Room, Surface};
@@ -13,7 +15,7 @@ use luxproof_scene::{Luminaire, LuminaireModel, Shape, Transport, flush};
 use parking_lot::Mutex;
 
 use self::backend::Backend;
-use self::settings::Settings;
+use self::settings::{Integrator, Settings};
 use super::cost::DirectCost;
 use super::dialogue::{Cost, Dialogue};
 use super::float_error::{FloatError, Instrument};
@@ -21,8 +23,8 @@ use super::frame::Frame;
 use super::libraries::ATOMIC;
 use super::settings::Preset;
 use super::{
-    Absent, Component, Engine, EngineError, EngineRoot, Entry, Job, JobDir, Measurement, SceneFile, Setting, Support,
-    Version,
+    Absent, Component, Engine, EngineError, EngineRoot, Entry, Job, JobDir, Measurement, SceneFile, Sensor, Setting,
+    Support, Version,
 };
 use luxproof_model::EngineName;
 
@@ -40,6 +42,12 @@ pub(super) static ENTRY: Entry = Entry {
 
 /// Nearer than this to a surface, a point luminaire's spot is too small for paths to find, in parts of the scene's size.
 const CLOSE: f64 = 2.5e-3;
+
+/// What every machine with a usable NVIDIA GPU has.
+const NVIDIA_DEVICE: &str = "/dev/nvidiactl";
+
+/// Nearer than this to a surface that it faces, in parts of the scene's size, a meter gets its light from few particles.
+const CLOSE_FACING: f64 = 0.02;
 
 /// So far outside a table's range our emitter takes a direction for its last angle (`EDGE_DEG` of `mitsuba_goniometric.py`).
 const EDGE_DEG: f64 = 5e-5;
@@ -79,9 +87,24 @@ impl Engine for Mitsuba {
         if let Some(why) = objection {
             return Support::No(why);
         }
-        if let (Some(id), Transport::Indirect(_) | Transport::Total(_)) =
-            (luminaire_close_to_a_surface(job), job.transport)
-        {
+        let settings = Settings::of(job).ok();
+        if settings.is_some_and(|settings| settings.is_on_gpu()) && !Path::new(NVIDIA_DEVICE).exists() {
+            return Support::No(format!("a variant for NVIDIA GPUs, and this machine has none ({NVIDIA_DEVICE})"));
+        }
+        if job.transport == Transport::Direct {
+            return Support::Yes;
+        }
+        if settings.is_some_and(|settings| settings.integrator == Integrator::Particles) {
+            return match meter_close_to_what_it_faces(job) {
+                Some(id) => {
+                    let why =
+                        format!("single particles next to `{id}`, which faces a surface close by, outweigh all others");
+                    Support::Approximate { why, size: None }
+                }
+                None => Support::Yes,
+            };
+        }
+        if let Some(id) = luminaire_close_to_a_surface(job) {
             let why = format!("paths seldom find the bright spot that `{id}` throws on a surface close by");
             return Support::Approximate { why, size: None };
         }
@@ -158,6 +181,20 @@ impl Mitsuba {
             None => Ok(known.insert(Backend::find(site)?).clone()),
         }
     }
+}
+
+/// A meter that faces a wall, floor or ceiling at a distance that is small against the scene.
+fn meter_close_to_what_it_faces(job: &Job) -> Option<&str> {
+    let room = job.scene.room?;
+    let close_m = CLOSE_FACING * room.size_m.max_element();
+    let faces_close_by = |sensor: &&Sensor| {
+        Surface::ALL.into_iter().any(|s| {
+            let inward = s.inward_normal();
+            let distance_m = (sensor.meter.position_m - room.corners(s)[0]).dot(inward);
+            sensor.meter.normal.dot(inward) < -1e-6 && distance_m < close_m
+        })
+    };
+    job.sensors.iter().find(faces_close_by).map(|sensor| sensor.id.0.as_str())
 }
 
 /// A luminaire that lights a surface at a distance that is tiny against the scene.

@@ -127,7 +127,7 @@ mod tests {
             ("mitsuba", "preset", json!("best"), "audit, fast or default"),
             ("cycles", "samples", json!(9), "no such setting; there are preset, photometry and recentre"),
             ("luxcore", "preset", json!("best"), "audit, fast or default"),
-            ("mitsuba", "samples", json!("9"), "no such setting; there are preset, variant and recentre"),
+            ("mitsuba", "samples", json!("9"), "no such setting; there are preset, variant, integrator and recentre"),
         ] {
             let text = export_with(engine, key, &value).unwrap_err();
             assert!(text.starts_with(&format!("engines.{engine}.{key}: ")) && text.contains(says), "{text}");

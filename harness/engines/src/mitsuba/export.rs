@@ -14,7 +14,7 @@ use serde::Serialize;
 
 pub(super) use self::stock::obstacle_to_stock;
 use super::ID;
-use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
+use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Integrator, Settings};
 use crate::comment::Comment;
 use crate::dialogue::{self, JOB_FILE, MeterPlacement};
 use crate::frame::Frame;
@@ -23,6 +23,7 @@ use crate::tables::Tables;
 use crate::{EngineError, Job, SceneFile, effort, meshes, recess};
 
 const READ: &str = include_str!("../../drivers/mitsuba_read.py");
+const METERS: &str = include_str!("../../drivers/mitsuba_meters.py");
 const GONIOMETRIC: &str = include_str!("../../drivers/mitsuba_goniometric.py");
 
 /// Russian roulette stops a path with 5 % at least, so that above this reflectance rare long paths carry the light.
@@ -33,11 +34,12 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, En
     let job = &*recess::separate(job);
     let tables = Tables::of(job);
     let mut files = vec![
-        SceneFile::text("scene.xml", scene_xml(job, &frame, &tables)),
+        SceneFile::text("scene.xml", scene_xml(job, settings, &frame, &tables)),
         SceneFile::text(JOB_FILE, job_json(job, settings, &frame)?),
         SceneFile::text("mitsuba_read.py", READ),
         SceneFile::text("blocks.py", dialogue::BLOCKS),
         SceneFile::text("mitsuba_goniometric.py", GONIOMETRIC),
+        SceneFile::text("mitsuba_meters.py", METERS),
     ];
     if has_surfaces(job) {
         files.push(SceneFile::text("room.xml", surfaces::room_xml(job, &frame)));
@@ -58,6 +60,7 @@ struct DriverJob<'a> {
     procedure: &'a str,
     scene: &'static str,
     variant: &'a str,
+    integrator: &'static str,
     transport: &'static str,
     emitters: usize,
     extended: bool,
@@ -90,6 +93,7 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
         procedure: job.procedure.name(),
         scene,
         variant: settings.variant,
+        integrator: settings.integrator.plugin(),
         transport: dialogue::transport(job),
         emitters: job.scene.luminaires.len(),
         extended: job.scene.luminaires.iter().any(opening::is_extended),
@@ -103,11 +107,11 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
         .map_err(|e| EngineError::output(ID, format!("the job cannot be written: {e}")))
 }
 
-fn scene_xml(job: &Job, frame: &Frame, tables: &Tables) -> String {
+fn scene_xml(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables) -> String {
     let mut xml =
         header(job, "The luminaires; read the meters of job.json with\n         python mitsuba_read.py job.json");
     xml += &placing::comment(frame);
-    xml += &integrator(job, "path");
+    xml += &integrator(job, settings.integrator);
     if has_surfaces(job) {
         xml += "    <include filename=\"room.xml\"/>\n";
     }
@@ -150,7 +154,7 @@ fn header(job: &Job, what: &str) -> String {
 /// The integrator with the path length that the transport asks for.
 ///
 /// Mitsuba's depth counts the segments of a path from the meter to the luminaire: N reflections are depth N + 1.
-fn integrator(job: &Job, kind: &str) -> String {
+fn integrator(job: &Job, kind: Integrator) -> String {
     let highest = job.scene.largest_reflectance();
     let (max_depth, rr_depth, why) = match job.reflections() {
         None => (1, 5, "direct light only".to_owned()),
@@ -165,12 +169,16 @@ fn integrator(job: &Job, kind: &str) -> String {
             (n + 1, 1_000_000, why)
         }
     };
+    // Direct light is read by itself.
+    let more =
+        if kind == Integrator::Particles { "\n        <boolean name=\"hide_emitters\" value=\"true\"/>" } else { "" };
     format!(
         r#"    <!-- {why} -->
-    <integrator type="{kind}">
+    <integrator type="{plugin}">
         <integer name="max_depth" value="{max_depth}"/>
-        <integer name="rr_depth" value="{rr_depth}"/>
+        <integer name="rr_depth" value="{rr_depth}"/>{more}
     </integrator>
-"#
+"#,
+        plugin = kind.plugin()
     )
 }

@@ -13,7 +13,7 @@ use super::surfaces::list;
 use super::{has_surfaces, header, integrator, placing};
 use crate::comment::Comment;
 use crate::frame::Frame;
-use crate::mitsuba::settings::Settings;
+use crate::mitsuba::settings::{Integrator, Settings};
 use crate::settings::Preset;
 use crate::tables::Tables;
 use crate::{Job, SceneFile, Sensor};
@@ -99,7 +99,7 @@ fn xml(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables) -> String
         settings.variant,
         if reads_patches(job) { " times pi" } else { "" }
     );
-    let mut xml = header(job, &what) + &placing::comment(frame) + &integrator(&patched(job), "volpath");
+    let mut xml = header(job, &what) + &placing::comment(frame) + &integrator(&patched(job), Integrator::VolumePath);
     if has_surfaces(job) {
         xml += "    <include filename=\"room.xml\"/>\n";
     }

@@ -1,6 +1,7 @@
 //! Scenes beyond the empty cube: extended luminaires, obstacles, bright rooms, far and tiny coordinates.
 
 use luxproof_photometry::{HorizontalAxis, LuminousOpening};
+use luxproof_scene::Bounces;
 
 use super::*;
 
@@ -110,4 +111,70 @@ fn what_cannot_be_read_well_is_said_beforehand() {
 #[test]
 fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
     crate::shared_tests::bounds_hold_and_decide(read, false, 6);
+}
+
+fn with_integrator(mut job: Job, integrator: &str, variant: &str) -> Job {
+    job.settings.insert("integrator".into(), integrator.into());
+    job.settings.insert("variant".into(), variant.into());
+    job
+}
+
+#[test]
+fn every_integrator_reads_the_same_light() {
+    for integrator in ["path", "volpath", "prb", "ptracer"] {
+        let mut job = with_integrator(s1(CONVERGED), integrator, "llvm_ad_mono");
+        job.budget = Budget { relative_error: 5e-3, seconds: 20.0 };
+        let found = read(&job);
+        assert!(worst_z(&found, &S1_INDIRECT_LX) < 5.0, "{integrator}: {found:?}");
+        assert!(worst(&relative_deviations(&found, &S1_INDIRECT_LX)) < 0.03, "{integrator}: {found:?}");
+    }
+}
+
+#[test]
+fn particles_and_paths_agree_in_furnished_rooms_with_openings() {
+    let mut job = shared_tests::furnished();
+    job.transport = Transport::Indirect(Bounces::AtMost(3));
+    job.budget = Budget { relative_error: 5e-3, seconds: 20.0 };
+    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.3, height_m: 0.1 };
+    job.scene.luminaires[0] = with_opening(job.scene.luminaires[0].clone(), opening);
+    let [paths, particles] =
+        ["path", "ptracer"].map(|integrator| read(&with_integrator(job.clone(), integrator, "llvm_ad_mono")));
+    for (path, particle) in paths.estimates.iter().zip(&particles.estimates) {
+        assert!((particle.value - path.value).abs() <= 0.03 * path.value, "{path:?} {particle:?}");
+    }
+    assert!(paths.estimates.iter().any(|path| path.value > 0.0), "{paths:?}");
+}
+
+#[test]
+fn particles_are_traced_without_compiled_kernels_too() {
+    let mut job = with_integrator(s1(CONVERGED), "ptracer", "scalar_rgb");
+    job.budget = Budget { relative_error: 0.1, seconds: 10.0 };
+    let found = read(&job);
+    assert!(worst_z(&found, &S1_INDIRECT_LX) < 5.0, "{found:?}");
+    assert!(worst(&relative_deviations(&found, &S1_INDIRECT_LX)) < 0.3, "{found:?}");
+}
+
+#[test]
+fn variants_for_a_gpu_are_declined_where_there_is_none() {
+    let support = Mitsuba::default().supports(&with_integrator(s1(CONVERGED), "path", "cuda_ad_mono"));
+    let is_there = std::path::Path::new("/dev/nvidiactl").exists();
+    match support {
+        Support::No(why) => assert!(!is_there && why.contains("NVIDIA"), "{why}"),
+        other => assert!(is_there, "{other:?}"),
+    }
+}
+
+#[test]
+fn integrators_that_do_not_go_with_other_settings_are_refused() {
+    for (integrator, variant, preset, says) in [
+        ("prb", "scalar_rgb", "audit", "automatic differentiation"),
+        ("ptracer", "llvm_ad_mono", "default", "volpath"),
+        ("photonmapper", "llvm_ad_mono", "audit", "path, volpath, prb or ptracer"),
+    ] {
+        let job = with_preset(with_integrator(s1(CONVERGED), integrator, variant), preset);
+        let error = Mitsuba::default().check_settings(&job).unwrap_err().to_string();
+        assert!(error.starts_with("engines.mitsuba.integrator: ") && error.contains(says), "{error}");
+    }
+    let stock = with_preset(with_integrator(s1(CONVERGED), "volpath", "llvm_ad_mono"), "default");
+    assert!(Mitsuba::default().check_settings(&stock).is_ok());
 }
