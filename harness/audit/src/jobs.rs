@@ -13,7 +13,7 @@ use parking_lot::Mutex;
 
 use crate::measure::{AnswerSource, Cost, CostedMeasurement, Failure, Instrument, Question, Reader};
 use crate::plan::{Plan, Planned, Run, SelectionReason};
-use luxproof_engines::{CpuUse, EngineError, Job, Measurement};
+use luxproof_engines::{CpuUse, EngineError, EngineRoot, Job, Measurement};
 use luxproof_model::{
     EngineName, EngineStatus, FailureKind, ProcedureId, Reading, ReadingKey, Recording, StatedErrors, Status,
 };
@@ -85,7 +85,7 @@ impl Running<'_> {
                 RunResult::Declined(skip) => skips.push(skip),
             }
         }
-        let engines = self.plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
+        let engines = self.plan.engines.iter().map(|planned| status(planned, &recordings, Some(&self.reader.site))).collect();
         Ok(Outcome { recordings, engines, skips, contradicted, from_cache })
     }
 
@@ -337,7 +337,7 @@ fn add_spot_check(taken: &mut CostedMeasurement, run: &Run, job: &Job, spot_chec
 
 /// The outcome of a case that does not run: a skip for every run of its plan, and engines with the given status.
 pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcome {
-    let mut engines: Vec<EngineStatus> = plan.engines.iter().map(|planned| self::status(planned, &[])).collect();
+    let mut engines: Vec<EngineStatus> = plan.engines.iter().map(|planned| self::status(planned, &[], None)).collect();
     let mut skips = vec![];
     for run in &plan.runs {
         engines[run.engine].status = status;
@@ -349,7 +349,7 @@ pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcom
 }
 
 /// The status of an engine after its recordings.
-fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
+fn status(planned: &Planned, recordings: &[Recording], site: Option<&EngineRoot>) -> EngineStatus {
     let id = planned.engine.name();
     let mine: Vec<&Recording> = recordings.iter().filter(|r| r.key.engine == id.as_str()).collect();
     let failures: Vec<&str> = mine.iter().filter_map(|r| r.failure.as_deref()).collect();
@@ -365,7 +365,10 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
     let fingerprint = planned.instrument().map(|i| i.version.fingerprint);
     let role = planned.engine.role();
     let mark = luxproof_engines::ALL.iter().position(|entry| entry.name == id);
-    EngineStatus { id, version: planned.version(), role, fingerprint, status, is_required, reason, wall_s, mark }
+    let version = planned.version();
+    let release = site.filter(|_| version.is_some()).and_then(|site| luxproof_engines::installed_release(&id, site));
+    let release = release.map(|release| release.to_string());
+    EngineStatus { id, version, release, role, fingerprint, status, is_required, reason, wall_s, mark }
 }
 
 #[cfg(test)]
@@ -378,7 +381,7 @@ mod tests {
     use crate::measure::Machine;
     use crate::plan::{Fill, Shortcut};
     use luxproof_engines::fixtures::{Fake, s1};
-    use luxproof_engines::{EngineRoot, Job, Version};
+    use luxproof_engines::{Job, Version};
     use luxproof_model::{Estimate, Uncertainty};
 
     /// What an engine reads at a job: `slope` lx more per meter along x, with a note where it reads `m[2]` alone.

@@ -27,6 +27,7 @@ pub(crate) fn add_recorded(case: &Case, plan: &Plan, selection: &Selection, outc
         outcome.engines.push(EngineStatus {
             id: engine,
             version: Some(version(readings)),
+            release: None,
             role: Role::Recorded,
             fingerprint: None,
             status,

@@ -218,7 +218,7 @@ impl Cards {
             let index = ReportIndex::new(report);
             let mut has_case = false;
             for status in report.engines.iter().filter(|status| status.status != Status::Absent) {
-                let label = ReleaseLabel::new(&status.id, status.version.as_deref());
+                let label = ReleaseLabel::of(status);
                 let evidence =
                     capabilities.capabilities.iter().map(|c| (&c.id, index.evidence(c, &status.id, &run.id)));
                 let evidence: Vec<_> = evidence.filter(|(_, cases)| !cases.is_empty()).collect();

@@ -3,19 +3,25 @@
 use std::cmp::Ordering;
 use std::fmt;
 
-use luxproof_model::{EngineName, Release};
+use luxproof_model::{EngineName, EngineStatus, Release};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The release of an engine: that of its name, as of `mitsuba@3.5.2`, or else its version. Sorts by release.
+/// The release of an engine: that of its name, as of `mitsuba@3.5.2`, that of its installation, or else its version.
+///
+/// Sorts by release.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct ReleaseLabel(String);
 
 impl ReleaseLabel {
-    /// The label of an engine with this version, as it reports it.
-    pub fn new(engine: &EngineName, version: Option<&str>) -> Self {
-        let named = engine.release().map(|release| release.to_string());
+    /// The label of an engine of a run.
+    pub fn of(status: &EngineStatus) -> Self {
+        Self::new(&status.id, status.release.as_deref(), status.version.as_deref())
+    }
+
+    fn new(engine: &EngineName, release: Option<&str>, version: Option<&str>) -> Self {
+        let named = engine.release().map(|release| release.to_string()).or_else(|| release.map(str::to_owned));
         let version = version.map(|version| number(version).map_or_else(|| version.to_owned(), |n| n.to_string()));
         Self(named.or(version).unwrap_or_else(|| "unknown".to_owned()))
     }
@@ -62,7 +68,7 @@ mod tests {
     use super::*;
 
     fn label(engine: &str, version: &str) -> ReleaseLabel {
-        ReleaseLabel::new(&EngineName::from(engine), Some(version))
+        ReleaseLabel::new(&EngineName::from(engine), None, Some(version))
     }
 
     #[test]
@@ -70,7 +76,9 @@ mod tests {
         assert_eq!(label("mitsuba@3.5.2", "mitsuba 3.5.2").as_str(), "3.5.2");
         assert_eq!(label("mitsuba", "mitsuba 3.9.1 (scalar_rgb)"), label("mitsuba@3.9.1", "3.9.1"));
         assert_eq!(label("iray", "recorded, 2016").as_str(), "recorded, 2016");
-        assert_eq!(ReleaseLabel::new(&EngineName::from("x"), None).as_str(), "unknown");
+        assert_eq!(ReleaseLabel::new(&EngineName::from("x"), None, None).as_str(), "unknown");
+        let installed = ReleaseLabel::new(&EngineName::from("radiance"), Some("1.3.1"), Some("6.0a"));
+        assert_eq!(installed, label("radiance@1.3.1", "6.0a"));
     }
 
     #[test]

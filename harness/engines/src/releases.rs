@@ -116,6 +116,11 @@ pub fn releases_of(engine: &str) -> Vec<Release> {
     of(engine).filter_map(KnownRelease::release).collect()
 }
 
+/// The release of an engine's default installation, where that is one that we know.
+pub fn installed_release(engine: &str, site: &EngineRoot) -> Option<Release> {
+    of(engine).find(|known| known.home == Home::Shared && known.is_in(site)).and_then(KnownRelease::release)
+}
+
 /// A release by its name.
 pub(super) fn known(name: &str) -> Option<&'static KnownRelease> {
     KNOWN.iter().find(|known| known.name == name)

@@ -12,6 +12,9 @@ pub struct EngineStatus {
     pub id: EngineName,
     /// Its version, where it is installed.
     pub version: Option<String>,
+    /// The release of a default installation, such as `1.3.1` of `radiance`; a release in the name is not repeated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub release: Option<String>,
     /// Whether it is judged or a reference.
     #[serde(default)]
     pub role: Role,

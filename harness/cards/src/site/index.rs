@@ -94,10 +94,13 @@ fn matrix(cards: &Cards) -> Markup {
 
 /// The renderer, its newest release, and the link to the others.
 fn column_head(renderer: &RendererCard) -> Markup {
-    let newest = renderer.releases.first().map(|release| release.release.as_str()).unwrap_or_default();
+    let newest = renderer.releases.first();
+    let label = newest.map(|release| release.release.as_str()).unwrap_or_default();
+    // Some releases have the number of a package, and their program another.
+    let other = newest.and_then(|release| release.versions.iter().find(|version| !version.contains(label)));
     html! {
         a href={ "renderers/" (renderer.slug) "/index.html" } { (renderer.name) }
-        span.release { (shortened(newest, 16)) }
+        span.release { (shortened(label, 16)) @if let Some(version) = other { " (" (shortened(version, 12)) ")" } }
         @if renderer.releases.len() > 1 {
             details {
                 summary { (renderer.releases.len()) " releases" }
