@@ -182,3 +182,19 @@ fn renderers_read_luminaires_on_surfaces_at_random_as_the_simulator_does() {
         assert_eq!(failures(&report), Vec::<String>::new(), "{k}: {text}");
     }
 }
+
+/// Values of a path tracer that shares no code with luxproof (150 lines of C, 15 million paths a point): the box of this room,
+/// a table in steps of 15 degrees between which intensities are linear, and a face that reflects nothing or as the box does.
+#[test]
+fn a_panel_on_a_box_reads_what_an_independent_path_tracer_reads() {
+    let table = "IESNA:LM-63-2002\n[TEST] x\n[TESTLAB] x\n[ISSUEDATE] 1-1-2026\n[MANUFAC] x\nTILT=NONE\n\
+                 1 -1 1 7 1 1 2 0.6 0.4 0\n1 1 10\n0 15 30 45 60 75 90\n0\n1000 965.926 866.025 707.107 500 258.819 0\n";
+    for (face, expected) in [("0", [(70.044, 0.029), (28.975, 0.017)]), ("0.5", [(70.723, 0.029), (29.279, 0.017)])] {
+        let luminaire =
+            format!("at_m: [0.5, 2, 1.8], model: area, rotate_deg: {{tilt: 180}}, face_reflectance: {face}");
+        let spec = spec(BOX_ROOM, BOX, &luminaire, "[[2, 2, 0.8], [4, 1.2, 0.8]]");
+        let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", table)]);
+        let report = folder.run(&["--engines", "simulator", "--format", "json"]).json();
+        assert_alike(&estimates(&report, "simulator", "indirect_illuminance"), &expected, 0.0, face);
+    }
+}

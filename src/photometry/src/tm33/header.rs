@@ -46,7 +46,7 @@ pub(super) fn lines_of(text: &str, places: impl Iterator<Item = usize>) -> Vec<u
     let (mut line, mut counted) = (1, 0);
     let mut lines = vec![];
     for at in places {
-        line += text.as_bytes()[counted..at].iter().filter(|byte| **byte == b'\n').count();
+        line += text.get(counted..at).map_or(0, |passed| passed.matches('\n').count());
         counted = at;
         lines.push(line);
     }

@@ -108,6 +108,8 @@ struct Sums {
     /// Variances of the mean of rays and of points before the last doubling of each.
     variances_before: [f64; 2],
     is_done: bool,
+    /// Light that surfaces reflect in the mean over the room.
+    reflected_lux: f64,
 }
 
 /// What one stage samples anew.
@@ -125,6 +127,8 @@ struct Sampling<'a> {
     map: Option<&'a BrightnessMap>,
     meters: &'a [Meter],
     starts_m: Vec<DVec3>,
+    /// Light that surfaces reflect in the mean over the room.
+    reflected_lux: f64,
     seed: u64,
     stop: &'a Stop,
 }
@@ -174,6 +178,7 @@ impl SampledRoom {
             map: for_meters.as_ref(),
             meters,
             starts_m: meters.iter().map(|m| self.lifted_m(m)).collect(),
+            reflected_lux: self.surroundings.mean_reflectance() * self.mean_lux,
             seed,
             stop,
         };
@@ -240,7 +245,7 @@ impl Sampling<'_> {
             points: if points_log2.is_some() { some.to_vec() } else { vec![] },
             point_range: 0..1 << points_log2.unwrap_or(0),
         };
-        let mut sums = vec![Sums::new(method); self.meters.len()];
+        let mut sums = vec![Sums::new(method, self.reflected_lux); self.meters.len()];
         let pilot = Sampling { seed: mix(self.seed ^ 0x9170 ^ u64::from(rays_log2)), ..self.borrowed() };
         let work = pilot.add_stage(&stage, &mut sums)?;
         Some((some.iter().map(|k| sums[*k].clone()).collect(), work))
@@ -270,6 +275,7 @@ impl Sampling<'_> {
             map: self.map,
             meters: self.meters,
             starts_m: self.starts_m.clone(),
+            reflected_lux: self.reflected_lux,
             seed: self.seed,
             stop: self.stop,
         }
@@ -282,7 +288,7 @@ impl Sampling<'_> {
         direct: &[f64],
         relative_error: f64,
     ) -> Result<(Vec<Sums>, f64, Option<Limit>), SimulatorError> {
-        let mut sums = vec![Sums::new(method); self.meters.len()];
+        let mut sums = vec![Sums::new(method, self.reflected_lux); self.meters.len()];
         let granted = self.stop.rays.unwrap_or(u64::MAX);
         let mut work = Work::default();
         let mut limit = None;
@@ -483,9 +489,10 @@ impl Work {
 }
 
 impl Sums {
-    fn new(method: Method) -> Self {
+    fn new(method: Method, reflected_lux: f64) -> Self {
         Self {
             method,
+            reflected_lux,
             rays: [0.0; REPLICATES],
             points: [0.0; REPLICATES],
             rays_log2: None,
@@ -516,7 +523,21 @@ impl Sums {
     fn error(&self) -> f64 {
         let variance = mean_and_error(&self.replicates()).1.powi(2);
         let promised = HALF * (self.variances_before[0] + self.variances_before[1]);
-        if promised > 0.0 { (HALF * (variance + promised)).sqrt() } else { variance.sqrt() }
+        let scatter = if promised > 0.0 { HALF * (variance + promised) } else { variance };
+        (scatter + self.unseen_lux().powi(2)).sqrt()
+    }
+
+    /// Standard uncertainty of light that no path has met: one path in as many as were cast may be the first to meet a surface of
+    /// the room's mean brightness.
+    ///
+    /// Only where it is dim does that exceed the scatter: in a slit between a body and a wall, say, where few paths find the way out.
+    fn unseen_lux(&self) -> f64 {
+        if self.value() < DIM_PART * self.reflected_lux { self.reflected_lux / self.count() } else { 0.0 }
+    }
+
+    /// The number of rays or paths in all replicates.
+    fn count(&self) -> f64 {
+        f64::from(1_u32 << self.rays_log2.unwrap_or(0)) * REPLICATES as f64
     }
 
     /// Variances of the mean that rays and points make.
@@ -547,7 +568,7 @@ impl Sums {
         }
         let (rays, points) = self.variances();
         let most = HALF * allowed * allowed;
-        let more_rays = rays > most || self.rays_log2 == Some(*RAYS_LOG2.start());
+        let more_rays = rays + self.unseen_lux().powi(2) > most || self.rays_log2 == Some(*RAYS_LOG2.start());
         let more_points = points > most || self.points_log2 == Some(*POINTS_LOG2.start());
         if more_rays || more_points { (more_rays, more_points) } else { (rays >= points, points > rays) }
     }
@@ -570,9 +591,8 @@ impl Sums {
             let wider = self.error() / scatter;
             sampled = sampled.map(|s| mean + wider * (s - mean));
         }
-        let count = f64::from(1_u32 << self.rays_log2.unwrap_or(0)) * REPLICATES as f64;
         // What no path met has a probability below three in so many (95 %), and about the light of a mean surface.
-        let unseen = if sampled.iter().all(|s| *s == 0.0) { 3.0 * mean_lux / count } else { 0.0 };
+        let unseen = if sampled.iter().all(|s| *s == 0.0) { 3.0 * mean_lux / self.count() } else { 0.0 };
         Reading { known: Bounded { value: 0.0, bound: unseen }, sampled }
     }
 }
@@ -594,7 +614,7 @@ fn plan_stage(sums: &mut [Sums], direct: &[f64], relative_error: f64) -> Stage {
     let goes_over = points_log2.is_some_and(|p| p >= *POINTS_LOG2.end() || are_few && p >= ENOUGH_POINTS_LOG2);
     for (k, (rays, points)) in needs.into_iter().enumerate() {
         if points && goes_over {
-            sums[k] = Sums::new(Method::Paths);
+            sums[k] = Sums::new(Method::Paths, sums[k].reflected_lux);
         }
         let sums = &sums[k];
         if rays || points && goes_over {

@@ -196,6 +196,13 @@ impl Surroundings {
         joined.unwrap_or([DVec3::ZERO, DVec3::ONE])
     }
 
+    /// The mean reflectance of all surfaces by area.
+    pub(super) fn mean_reflectance(&self) -> f64 {
+        let area_m2: f64 = self.surfaces.iter().map(|s| s.area_m2).sum();
+        let reflected_m2: f64 = self.surfaces.iter().map(|s| s.reflectance * s.area_m2).sum();
+        if area_m2 > 0.0 { reflected_m2 / area_m2 } else { 0.0 }
+    }
+
     /// How far rays start off a surface, in metres.
     pub(super) fn lift_m(&self) -> f64 {
         LIFT * self.extent_m
