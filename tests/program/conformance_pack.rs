@@ -28,7 +28,9 @@ fn answers_are_judged_and_a_mistake_is_named_with_its_remedy() {
 
     let mut answers: Value = own.json();
     let candela = answers["files"]["multiplier.ies"]["candela"].as_array_mut().unwrap();
-    candela.iter_mut().for_each(|value| *value = json!(value.as_f64().unwrap() / 2.5));
+    for value in candela.iter_mut() {
+        *value = json!(value.as_f64().unwrap() / 2.5);
+    }
     folder.write("wrong.json", &answers.to_string());
     let wrong = folder.luxproof(&["conformance", "check", "wrong.json"]).exits(1);
     let wrong = wrong.prints("WRONG: multiplier-ignored").prints("tests: A candela multiplier of 2.5.");
