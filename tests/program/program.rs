@@ -45,6 +45,7 @@ mod repeatability;
 mod repetitions;
 mod reproduce;
 mod rooms;
+mod scene_formats;
 mod sets_of_meters;
 mod stated_errors;
 mod stops;

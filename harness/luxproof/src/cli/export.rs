@@ -11,13 +11,15 @@ use luxproof_console::{complain, print};
 use luxproof_engines::EngineRoot;
 use luxproof_model::Exit;
 use luxproof_model::ProcedureId;
+use luxproof_process::files::keep_shared;
+use luxproof_scene_export::{ExportedScene, SceneFormat, export_scene};
 use luxproof_spec::{Case, SpecError, Trust, suite};
 
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
     /// Spec file
     spec: PathBuf,
-    /// The engine
+    /// The engine; or `usd` or `gltf` for a scene that other programs read
     #[arg(long)]
     engine: String,
     /// Folder to write to; it gets one folder per procedure
@@ -31,6 +33,13 @@ pub(super) struct ExportArgs {
 pub(super) fn export(args: &ExportArgs, site: &EngineRoot, trust: Trust) -> Result<Exit, Diagnostic> {
     let cases = suite(std::slice::from_ref(&args.spec), trust).map_err(diagnose)?;
     super::refuse_links(&args.out, trust)?;
+    if let Some(format) = SceneFormat::ALL.into_iter().find(|format| format.name() == args.engine) {
+        for case in &cases {
+            let folder = if cases.len() == 1 { args.out.clone() } else { args.out.join(&case.name) };
+            export_as(case, format, &folder)?;
+        }
+        return Ok(Exit::Passed);
+    }
     let mut exported = 0;
     for case in &cases {
         // One folder a case, where there are several.
@@ -41,6 +50,20 @@ pub(super) fn export(args: &ExportArgs, site: &EngineRoot, trust: Trust) -> Resu
         complain(&format!("{} writes no scenes", args.engine));
     }
     Ok(Exit::Passed)
+}
+
+/// Writes a case in a format of scenes, and says what is lost.
+fn export_as(case: &Case, format: SceneFormat, out: &Path) -> Result<(), Diagnostic> {
+    let ExportedScene { files, losses } = export_scene(&case.scene, &case.title, format);
+    for file in &files {
+        let path = out.join(&file.name);
+        keep_shared(&path, &file.bytes).into_diagnostic()?;
+        print(&format!("{}\n", path.display()))?;
+    }
+    for loss in losses {
+        complain(&format!("{}: {loss}", format.name()));
+    }
+    Ok(())
 }
 
 /// How many files it made.

@@ -1,0 +1,100 @@
+//! Exported scenes against what was exported.
+
+use std::sync::Arc;
+
+use glam::{DMat4, DQuat, DVec3};
+use luxproof_photometry::{LuminousIntensityDistribution, Photometry};
+use luxproof_scene::geometry::{Reflectances, Room};
+use luxproof_scene::{Obstacle, Shape, orientation};
+use serde_json::Value;
+
+use super::*;
+
+/// A room with a box and a turned luminaire.
+fn scene() -> Scene {
+    let table = LuminousIntensityDistribution::axial(vec![0.0, 60.0, 90.0], vec![300.0, 200.0, 0.0]).unwrap();
+    let reflectance =
+        Reflectances { floor: 0.2, ceiling: 0.7, wall_x_min: 0.5, wall_x_max: 0.5, wall_y_min: 0.5, wall_y_max: 0.5 };
+    Scene {
+        room: Some(Room { size_m: DVec3::new(6.0, 4.0, 3.0), reflectance }),
+        obstacles: vec![Obstacle {
+            shape: Shape::Box { min_m: DVec3::new(1.0, 1.0, 0.0), max_m: DVec3::new(2.0, 1.5, 0.75) },
+            reflectance: 0.4,
+        }],
+        luminaires: vec![Luminaire {
+            id: "desk \"left\"".into(),
+            photometry: Arc::new(Photometry::of(table)),
+            position_m: DVec3::new(1.5, 2.0, 2.5),
+            orientation: orientation(30.0, 20.0, 10.0),
+            flux_scale: 0.8,
+            model: LuminaireModel::Point,
+        }],
+    }
+}
+
+fn file(exported: &ExportedScene, name: &str) -> String {
+    let found = exported.files.iter().find(|file| file.name == name).unwrap();
+    String::from_utf8(found.bytes.clone()).unwrap()
+}
+
+#[test]
+fn every_face_of_a_scene_looks_where_light_is() {
+    for mesh in soup::meshes(&scene()) {
+        let centre =
+            if mesh.name.starts_with("obstacle") { DVec3::new(1.5, 1.25, 0.375) } else { DVec3::new(3.0, 2.0, 1.5) };
+        let is_body = mesh.name.starts_with("obstacle");
+        for [a, b, c] in mesh.triangles.iter().map(|t| t.map(|k| mesh.vertices_m[k as usize])) {
+            let inwards = (b - a).cross(c - a).dot(centre - a);
+            assert!(if is_body { inwards < 0.0 } else { inwards > 0.0 }, "{} {a} {b} {c}", mesh.name);
+        }
+    }
+}
+
+#[test]
+fn a_gltf_light_is_where_the_luminaire_is() {
+    let scene = scene();
+    let exported = export_scene(&scene, "a room", SceneFormat::Gltf);
+    let document: Value = serde_json::from_str(&file(&exported, "scene.gltf")).unwrap();
+    let nodes = document["nodes"].as_array().unwrap();
+    let numbers = |value: &Value| value.as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect::<Vec<_>>();
+    let quaternion = |node: &Value| DQuat::from_slice(&numbers(&node["rotation"]));
+    let light = nodes.last().unwrap();
+    let root = DMat4::from_quat(quaternion(&nodes[0]));
+    let local = DMat4::from_rotation_translation(quaternion(light), DVec3::from_slice(&numbers(&light["translation"])));
+    let world = root * local;
+    let luminaire = &scene.luminaires[0];
+    // glTF's y is up: (x, y, z) is (x, z, -y) there.
+    let to_gltf = |v: DVec3| DVec3::new(v.x, v.z, -v.y);
+    assert!(world.transform_point3(DVec3::ZERO).distance(to_gltf(luminaire.position_m)) < 1e-12);
+    for axis in [DVec3::X, DVec3::Y, DVec3::NEG_Z] {
+        let expected = to_gltf(luminaire.orientation * axis);
+        assert!(world.transform_vector3(axis).distance(expected) < 1e-12, "{axis}");
+    }
+    assert_eq!(light["extensions"]["EXT_lights_ies"]["multiplier"], 0.8);
+    assert_eq!(document["extensions"]["EXT_lights_ies"]["lights"][0]["uri"], "luminaire-0.ies");
+    let profile = lm63::parse(file(&exported, "luminaire-0.ies").as_bytes()).unwrap();
+    assert_eq!(profile.distribution, luminaire.photometry.distribution);
+    // Six surfaces and a box of four reflectances.
+    assert_eq!(document["meshes"].as_array().unwrap().len(), 7);
+    assert_eq!(document["materials"].as_array().unwrap().len(), 4);
+}
+
+#[test]
+fn a_usd_light_has_the_candela_of_its_profile() {
+    let scene = scene();
+    let text = file(&export_scene(&scene, "a \"room\"", SceneFormat::Usd), "scene.usda");
+    // pi r^2 of the 4 pi r^2 by which `normalize` divides: four times the scale gives the candela of the file.
+    for part in [
+        "metersPerUnit = 1\n",
+        "upAxis = \"Z\"",
+        "def SphereLight \"desk__left_\"",
+        "float inputs:intensity = 3.2\n",
+        "asset inputs:shaping:ies:file = @luminaire-0.ies@",
+        "a \\\"room\\\". Metres",
+        "(1.5, 2, 2.5, 1) )",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert_eq!(text.matches("def Mesh").count(), 7);
+    assert_eq!(text.matches('{').count(), text.matches('}').count());
+}

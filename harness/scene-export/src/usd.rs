@@ -1,0 +1,173 @@
+//! `scene.usda`: meshes with diffuse materials, and the lights of `UsdLux` with `shaping:ies:file`.
+//!
+//! Source: `OpenUSD`, `UsdLux`: intensity is luminance in nits; `normalize` divides it by the area of the light; the profile
+//! multiplies it; lights shine along -z. A sphere that is treated as a point then has a quarter of `intensity` times the
+//! profile as its luminous intensity: pi r^2 of 4 pi r^2.
+
+use std::collections::BTreeSet;
+
+use glam::{DMat3, DVec3};
+use itertools::Itertools as _;
+use luxproof_photometry::LuminousOpening;
+use luxproof_scene::{Luminaire, LuminaireModel, Scene};
+
+use crate::profile_name;
+use crate::soup::{Mesh, meshes};
+
+/// `intensity` of a sphere per candela of its profile.
+const SPHERE_INTENSITY: f64 = 4.0;
+/// The radius of a sphere that stands for a point, in metres.
+const POINT_RADIUS_M: f64 = 1e-3;
+
+/// The layer.
+pub(crate) fn text(scene: &Scene, title: &str) -> String {
+    let meshes = meshes(scene);
+    let mut names = PrimNames::default();
+    let mut text = format!(
+        "#usda 1.0\n(\n    defaultPrim = \"World\"\n    doc = {doc}\n    metersPerUnit = 1\n    upAxis = \"Z\"\n)\n\n\
+         def Xform \"World\" (\n    kind = \"component\"\n)\n{{\n",
+        doc = quoted(&format!("{title}. Metres; intensities in nits, profiles in candela; z is up. By luxproof."))
+    );
+    let reflectances: Vec<f64> = meshes.iter().map(|mesh| mesh.reflectance).sorted_by(f64::total_cmp).dedup().collect();
+    text += "    def Scope \"Materials\"\n    {\n";
+    for (k, rho) in reflectances.iter().enumerate() {
+        text += &material(k, *rho);
+    }
+    text += "    }\n";
+    for mesh in &meshes {
+        let material = reflectances.iter().position(|rho| *rho == mesh.reflectance).unwrap_or_default();
+        text += &mesh_prim(mesh, &names.unique(&mesh.name), material);
+    }
+    for (k, luminaire) in scene.luminaires.iter().enumerate() {
+        text += &light(luminaire, &names.unique(&luminaire.id), &profile_name(k));
+    }
+    text + "}\n"
+}
+
+/// Names of prims, each once.
+#[derive(Default)]
+struct PrimNames(BTreeSet<String>);
+
+impl PrimNames {
+    /// A name of letters, digits and underscores that is not taken yet.
+    fn unique(&mut self, text: &str) -> String {
+        let plain: String = text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        let plain = if plain.starts_with(|c: char| c.is_ascii_alphabetic()) { plain } else { format!("_{plain}") };
+        let numbered = std::iter::once(plain.clone()).chain((2..).map(|k| format!("{plain}_{k}")));
+        let name = numbered.into_iter().find(|name| !self.0.contains(name)).unwrap_or(plain);
+        self.0.insert(name.clone());
+        name
+    }
+}
+
+/// A diffuse material.
+fn material(k: usize, rho: f64) -> String {
+    format!(
+        r#"        def Material "reflectance_{k}"
+        {{
+            token outputs:surface.connect = </World/Materials/reflectance_{k}/Surface.outputs:surface>
+
+            def Shader "Surface"
+            {{
+                uniform token info:id = "UsdPreviewSurface"
+                color3f inputs:diffuseColor = ({rho}, {rho}, {rho})
+                float inputs:metallic = 0
+                float inputs:roughness = 1
+                color3f inputs:specularColor = (0, 0, 0)
+                int inputs:useSpecularWorkflow = 1
+                token outputs:surface
+            }}
+        }}
+"#
+    )
+}
+
+/// A mesh with its material.
+fn mesh_prim(mesh: &Mesh, name: &str, material: usize) -> String {
+    let low = mesh.vertices_m.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = mesh.vertices_m.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let rho = mesh.reflectance;
+    format!(
+        r#"
+    def Mesh "{name}" (
+        prepend apiSchemas = ["MaterialBindingAPI"]
+    )
+    {{
+        uniform bool doubleSided = 1
+        float3[] extent = [{low}, {high}]
+        int[] faceVertexCounts = [{counts}]
+        int[] faceVertexIndices = [{indices}]
+        rel material:binding = </World/Materials/reflectance_{material}>
+        point3f[] points = [{points}]
+        color3f[] primvars:displayColor = [({rho}, {rho}, {rho})]
+        uniform token subdivisionScheme = "none"
+    }}
+"#,
+        low = tuple(low),
+        high = tuple(high),
+        counts = mesh.triangles.iter().map(|_| "3").join(", "),
+        indices = mesh.triangles.iter().flatten().join(", "),
+        points = mesh.vertices_m.iter().map(|v| tuple(*v)).join(", "),
+    )
+}
+
+/// The light of a luminaire.
+fn light(luminaire: &Luminaire, name: &str, profile: &str) -> String {
+    let (kind, shape, factor) = match (luminaire.model, luminaire.photometry.opening) {
+        (LuminaireModel::Point, _) | (_, LuminousOpening::Point) => sphere(),
+        (_, LuminousOpening::Box { x_m, y_m, height_m: 0.0 }) if x_m > 0.0 && y_m > 0.0 => {
+            ("RectLight", format!("float inputs:width = {x_m}\n        float inputs:height = {y_m}"), 1.0)
+        }
+        (_, LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 }) if x_m == y_m && x_m > 0.0 => {
+            ("DiskLight", format!("float inputs:radius = {}", 0.5 * x_m), 1.0)
+        }
+        _ => sphere(),
+    };
+    format!(
+        r#"
+    def {kind} "{name}" (
+        prepend apiSchemas = ["ShapingAPI"]
+    )
+    {{
+        float inputs:intensity = {intensity}
+        bool inputs:normalize = 1
+        {shape}
+        float inputs:shaping:ies:angleScale = 0
+        asset inputs:shaping:ies:file = @{profile}@
+        bool inputs:shaping:ies:normalize = 0
+        matrix4d xformOp:transform = {matrix}
+        uniform token[] xformOpOrder = ["xformOp:transform"]
+    }}
+"#,
+        intensity = factor * luminaire.flux_scale,
+        matrix = matrix(luminaire.orientation, luminaire.position_m),
+    )
+}
+
+/// A sphere that is treated as a point.
+fn sphere() -> (&'static str, String, f64) {
+    let shape = format!("float inputs:radius = {POINT_RADIUS_M}\n        bool treatAsPoint = 1");
+    ("SphereLight", shape, SPHERE_INTENSITY)
+}
+
+/// A rotation and a translation; USD multiplies rows from the left.
+fn matrix(rotation: DMat3, at_m: DVec3) -> String {
+    let row = |v: DVec3, last: u8| format!("({}, {}, {}, {last})", v.x, v.y, v.z);
+    format!(
+        "( {}, {}, {}, {} )",
+        row(rotation.x_axis, 0),
+        row(rotation.y_axis, 0),
+        row(rotation.z_axis, 0),
+        row(at_m, 1)
+    )
+}
+
+fn tuple(v: DVec3) -> String {
+    format!("({}, {}, {})", v.x, v.y, v.z)
+}
+
+/// A text in double quotes.
+fn quoted(text: &str) -> String {
+    let plain: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    format!("\"{}\"", plain.replace('\\', "\\\\").replace('"', "\\\""))
+}
