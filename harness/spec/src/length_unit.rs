@@ -65,7 +65,7 @@ fn readable(number: f64) -> String {
     let short = trimmed(number, 4);
     let rounded: f64 = short.parse().unwrap_or(number);
     let off = (rounded - number).abs();
-    if off > 1e-9 * number.abs().max(1.0) && off < 1e-5 { trimmed(number, 9) } else { short }
+    if off > 1e-9 * number.abs().max(1.0) && off < 2e-6 { trimmed(number, 9) } else { short }
 }
 
 impl Spec {

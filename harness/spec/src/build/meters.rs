@@ -181,10 +181,11 @@ impl Builder<'_> {
         let Some((k, point, (message, help))) = wrong.next() else { return };
         let others = others(wrong.count());
         let at = format!("meters.{name}");
-        let (at, whole) = match (written, points.first().zip(points.last())) {
-            (Written::By(key), Some((first, last))) => (
+        let corners_m = points.iter().copied().reduce(DVec3::min).zip(points.iter().copied().reduce(DVec3::max));
+        let (at, whole) = match (written, corners_m) {
+            (Written::By(key), Some((low_m, high_m))) => (
                 format!("{at}.{key}"),
-                format!("; the {key} reaches from {} to {}", self.unit.point(*first), self.unit.point(*last)),
+                format!("; the {key} reaches from {} to {}", self.unit.point(low_m), self.unit.point(high_m)),
             ),
             _ => (format!("{at}.points_m[{k}]"), String::new()),
         };
