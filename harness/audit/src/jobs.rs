@@ -85,7 +85,8 @@ impl Running<'_> {
                 RunResult::Declined(skip) => skips.push(skip),
             }
         }
-        let engines = self.plan.engines.iter().map(|planned| status(planned, &recordings, Some(&self.reader.site))).collect();
+        let engines =
+            self.plan.engines.iter().map(|planned| status(planned, &recordings, Some(&self.reader.site))).collect();
         Ok(Outcome { recordings, engines, skips, contradicted, from_cache })
     }
 

@@ -81,9 +81,12 @@ fn nodes_of_type_c() -> Vec<AskedDirection> {
 
 /// LM-63 files about the fields before the table.
 fn lm63_files() -> Vec<PackFile> {
-    let whole = |factor: f64| type_c(&WHOLE_CIRCLE, &ALL_GAMMAS, ClosedForm::Skew, factor);
-    let file =
-        |name, feature, lm63: Lm63, factor| PackFile { name, feature, document: Document::Lm63(lm63), ..whole(factor) };
+    let file = |name, feature, lm63: Lm63, factor| PackFile {
+        name,
+        feature,
+        document: Document::Lm63(lm63),
+        ..type_c(&WHOLE_CIRCLE, &ALL_GAMMAS, ClosedForm::Skew, factor)
+    };
     let plain = Lm63::default();
     vec![
         PackFile {
@@ -311,7 +314,6 @@ fn eulumdat_files() -> Vec<PackFile> {
         PackFile { name, feature, document: Document::Eulumdat(document), ..type_c(planes, &ALL_GAMMAS, form, factor) }
     };
     let plain = Eulumdat::with_symmetry(0);
-    let set = |lamps, lumens| LampSet { lamps, lumens };
     vec![
         file(
             "isym-0.ldt",
@@ -358,7 +360,7 @@ fn eulumdat_files() -> Vec<PackFile> {
         file(
             "lamp-count.ldt",
             "2 lamps of 8000 lm together: the flux of a set is that of all its lamps.",
-            Eulumdat { sets: vec![set(2, 8000.0)], ..plain.clone() },
+            Eulumdat { sets: vec![LampSet::new(2, 8000.0)], ..plain.clone() },
             KILOLUMENS,
         ),
         PackFile {
@@ -366,14 +368,14 @@ fn eulumdat_files() -> Vec<PackFile> {
             ..file(
                 "lamp-sets.ldt",
                 "Two lamp sets, of 8000 and of 12000 lm.",
-                Eulumdat { sets: vec![set(1, 8000.0), set(1, 12000.0)], ..plain.clone() },
+                Eulumdat { sets: vec![LampSet::new(1, 8000.0), LampSet::new(1, 12000.0)], ..plain.clone() },
                 KILOLUMENS,
             )
         },
         file(
             "absolute.ldt",
             "Absolute photometry: the number of lamps is -1.",
-            Eulumdat { sets: vec![set(-1, 8000.0)], ..plain },
+            Eulumdat { sets: vec![LampSet::new(-1, 8000.0)], ..plain },
             KILOLUMENS,
         ),
     ]

@@ -92,15 +92,19 @@ fn emit(folder: &Path, is_forced: bool) -> Result<Exit, Diagnostic> {
     Ok(Exit::Passed)
 }
 
+/// Refuses a file of answers.
+fn refuse(path: &Path, error: &str, help: &str) -> Diagnostic {
+    miette!(help = help.to_owned(), "{}: {error}", path.display())
+}
+
 /// Judges a submission.
 fn check(args: &CheckArgs) -> Result<Exit, Diagnostic> {
     let path = &args.results;
-    let place = |error: String, help: &str| miette!(help = help.to_owned(), "{}: {error}", path.display());
     let bytes = files::read_bounded(path, MAX_RESULTS_BYTES)
-        .map_err(|error| place(error.to_string(), "name the file with the answers of your reader"))?;
+        .map_err(|error| refuse(path, &error.to_string(), "name the file with the answers of your reader"))?;
     let submission: Submission = serde_json::from_slice(&bytes)
-        .map_err(|error| place(error.to_string(), "results.schema.json of the pack describes the file"))?;
-    let judgement = judge(&submission).map_err(|error| place(error.to_string(), error.help()))?;
+        .map_err(|error| refuse(path, &error.to_string(), "results.schema.json of the pack describes the file"))?;
+    let judgement = judge(&submission).map_err(|error| refuse(path, &error.to_string(), error.help()))?;
     match args.format {
         Format::Json => print(&json(&judgement)?)?,
         Format::Terminal => print(&format_judgement(&judgement))?,
@@ -156,9 +160,14 @@ fn describe(verdict: &FileVerdict) -> String {
     match verdict {
         FileVerdict::Right => "intensities right".into(),
         FileVerdict::Mistakes { alternatives, factor } => {
-            let one = |mistakes: &Vec<Mistake>| mistakes.iter().map(|mistake| mistake.id()).join(" and ");
             let factor = factor.map(|factor| format!(", and {factor:.4} times that")).unwrap_or_default();
-            format!("WRONG: {}{factor}", alternatives.iter().map(one).join(", or "))
+            format!(
+                "WRONG: {}{factor}",
+                alternatives
+                    .iter()
+                    .map(|mistakes| mistakes.iter().copied().map(Mistake::id).join(" and "))
+                    .join(", or ")
+            )
         }
         FileVerdict::Factor { factor } => {
             format!("WRONG: all answers are {factor:.4} times the expected, which no known mistake gives")

@@ -32,13 +32,12 @@ pub(crate) enum Document {
 impl Document {
     /// Candela per number of the table, as a reader with these mistakes takes it.
     pub(crate) fn factor(&self, table: &Table, mistakes: &[Mistake], variant: Option<Variant>) -> f64 {
-        let makes = |mistake: Mistake| mistakes.contains(&mistake);
         let mut factor = match self {
             Self::Lm63(lm63) => lm63.factor(mistakes, variant),
             Self::Eulumdat(eulumdat) | Self::Gldf(eulumdat) => eulumdat.factor(table, mistakes, variant),
             Self::Tm33(tm33) => tm33.factor(mistakes),
         };
-        if makes(Mistake::UnlistedFileRead) && matches!(self, Self::Gldf(_)) {
+        if mistakes.contains(&Mistake::UnlistedFileRead) && matches!(self, Self::Gldf(_)) {
             factor *= gldf::UNLISTED_FACTOR;
         }
         factor

@@ -199,9 +199,9 @@ impl Answers<'_> {
 
     /// Whether an answer is a prediction times a factor.
     fn is_met(&self, Prediction { least, most, .. }: Prediction, answer: f64, scale: f64) -> bool {
-        let room = |candela: f64| self.allowed_cd(candela);
-        let bound =
-            |candela: f64, side: f64| if candela.is_finite() { candela + side * room(candela) } else { candela };
+        let bound = |candela: f64, side: f64| {
+            if candela.is_finite() { candela + side * self.allowed_cd(candela) } else { candela }
+        };
         let (low, high) = (scale * bound(least, -1.0), scale * bound(most, 1.0));
         (low.min(high)..=low.max(high)).contains(&answer)
     }
@@ -214,17 +214,21 @@ impl Answers<'_> {
 
 /// The middle ratio of answers and predictions: some wrong answers do not move it.
 fn middle_ratio(pairs: &[(Prediction, f64)]) -> Option<f64> {
-    let ratio = |(prediction, answer): &(Prediction, f64)| {
-        prediction.exact().filter(|expected| *expected > 0.0).map(|expected| answer / expected)
-    };
-    let mut ratios: Vec<f64> = pairs.iter().filter_map(ratio).collect();
+    let mut ratios: Vec<f64> = vec![];
+    for (prediction, answer) in pairs {
+        ratios.extend(prediction.exact().filter(|expected| *expected > 0.0).map(|expected| answer / expected));
+    }
     ratios.sort_by(f64::total_cmp);
     ratios.get(ratios.len() / 2).copied()
 }
 
+/// Whether a product is one but for rounding.
+fn is_one(product: f64) -> bool {
+    (product - 1.0).abs() <= FACTOR_TOLERANCE
+}
+
 /// The normalisation that multiplies all intensities of a file by this factor.
 fn name_factor(file: &PackFile, factor: f64) -> Option<Variant> {
-    let is_one = |product: f64| (product - 1.0).abs() <= FACTOR_TOLERANCE;
     if is_one(factor * file.peak_cd()) {
         return Some(Variant::NormalisedToPeak);
     }

@@ -15,11 +15,12 @@ pub(crate) const METHODS: [Variant; 5] =
 pub(crate) fn answers_between(file: &PackFile, method: Variant) -> Vec<Option<f64>> {
     let is_whole = file.table.goniometer == Goniometer::C;
     let factor = file.factor();
-    let answer = |c: f64, gamma: f64| interpolate(&file.table, method, c, gamma) * factor;
-    let directions = file.directions.iter();
-    directions
-        .map(|asked| (is_whole && asked.place == Place::Between).then(|| answer(asked.c_deg, asked.gamma_deg)))
-        .collect()
+    let mut answers = vec![];
+    for asked in &file.directions {
+        let is_between = is_whole && asked.place == Place::Between;
+        answers.push(is_between.then(|| interpolate(&file.table, method, asked.c_deg, asked.gamma_deg) * factor));
+    }
+    answers
 }
 
 /// The number of a table over the whole circle at an angle between its nodes.
@@ -43,9 +44,8 @@ fn with_cosine(method: Variant, table: &Table, place: Bracket, gamma_deg: f64) -
     if method != Variant::LinearInCosine || place.below == place.above {
         return place;
     }
-    let cosine = |deg: f64| deg.to_radians().cos();
-    let [below, above] = [place.below, place.above].map(|k| cosine(table.vertical_deg[k]));
-    Bracket { fraction: (cosine(gamma_deg) - below) / (above - below), ..place }
+    let [below, above] = [place.below, place.above].map(|k| table.vertical_deg[k].to_radians().cos());
+    Bracket { fraction: (gamma_deg.to_radians().cos() - below) / (above - below), ..place }
 }
 
 /// The value at a place between nodes.

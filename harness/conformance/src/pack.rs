@@ -1,5 +1,7 @@
 //! The files of the pack as they are written to a folder.
 
+use std::collections::BTreeMap;
+
 use schemars::{JsonSchema, schema_for};
 use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
@@ -82,6 +84,12 @@ pub struct NamedSentence {
     pub sentence: String,
 }
 
+impl NamedSentence {
+    fn new(name: &str, sentence: &str) -> Self {
+        Self { name: name.into(), sentence: sentence.into() }
+    }
+}
+
 /// All files of the pack.
 pub fn written_files() -> Result<Vec<WrittenFile>, PackError> {
     let mut written = vec![
@@ -116,7 +124,6 @@ fn json(path: &str, value: &impl Serialize) -> Result<WrittenFile, PackError> {
 }
 
 fn index() -> PackIndex {
-    let named = |name: &str, sentence: &str| NamedSentence { name: name.into(), sentence: sentence.into() };
     let files = pack_files().into_iter().map(|file| IndexEntry {
         file: photometry_path(file.name),
         expected: expected_path(file.name),
@@ -127,19 +134,23 @@ fn index() -> PackIndex {
         pack: PACK_VERSION.into(),
         license: "CC0-1.0".into(),
         files: files.collect(),
-        mistakes: Mistake::iter().map(|mistake| named(mistake.id(), mistake.sentence())).collect(),
-        variants: Variant::iter().map(|variant| named(variant.id(), variant.sentence())).collect(),
+        mistakes: Mistake::iter().map(|mistake| NamedSentence::new(mistake.id(), mistake.sentence())).collect(),
+        variants: Variant::iter().map(|variant| NamedSentence::new(variant.id(), variant.sentence())).collect(),
     }
 }
 
 /// A submission without answers, to be filled.
 fn template() -> Submission {
-    let empty = |directions: usize| FileAnswer { candela: Some(vec![None; directions]), ..FileAnswer::default() };
+    let mut files = BTreeMap::new();
+    for file in pack_files() {
+        let candela = Some(vec![None; file.directions.len()]);
+        files.insert(file.name.to_owned(), FileAnswer { candela, ..FileAnswer::default() });
+    }
     Submission {
         pack: PACK_VERSION.into(),
         reader: ReaderName { name: "name of your reader".into(), version: Some("its version".into()) },
         scale: Scale::Candela,
         relative_uncertainty: 0.0,
-        files: pack_files().iter().map(|file| (file.name.to_owned(), empty(file.directions.len()))).collect(),
+        files,
     }
 }

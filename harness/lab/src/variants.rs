@@ -373,12 +373,11 @@ mod tests {
                 assert!(variant.published.is_none());
                 let [a, b] = [case, variant].map(|c| c.scene.room.as_ref().unwrap().size_m);
                 assert!(a.x < b.x && a.y < b.y && a.z < b.z, "{}", case.name);
-                let procedures = |c: &Case| c.procedures.0.keys().copied().collect::<Vec<_>>();
-                assert_eq!(procedures(case), procedures(variant), "{}", case.name);
+                assert!(case.procedures.0.keys().eq(variant.procedures.0.keys()), "{}", case.name);
                 let [a, b] = [case, variant].map(|c| &c.scene.luminaires[0].photometry);
                 assert_eq!(a.opening, b.opening, "{}", case.name);
-                let flux = |c: &Case| c.scene.luminaires[0].photometry.distribution.flux().0;
-                assert!((flux(case) / flux(variant) - 1.0).abs() > 1e-4, "{}", case.name);
+                let [a, b] = [a, b].map(|photometry| photometry.distribution.flux().0);
+                assert!((a / b - 1.0).abs() > 1e-4, "{}", case.name);
                 assert_eq!(case.only_engines, variant.only_engines, "{}", case.name);
             }
         }
@@ -397,8 +396,8 @@ mod tests {
         let changed = redraw_candela(text, &mut Draw(Rng::with_seed(1))).unwrap();
         let candela = text.find("100 80 0").unwrap();
         assert_eq!(changed[..candela], text[..candela]);
-        let numbers = |text: &str| words(text, candela).unwrap().iter().map(|word| word.value).collect::<Vec<_>>();
-        let (before, after) = (numbers(text), numbers(&changed));
+        let [before, after] = [text, &changed]
+            .map(|text| words(text, candela).unwrap().iter().map(|word| word.value).collect::<Vec<_>>());
         assert_eq!(after.len(), 6);
         assert!(before.iter().zip(&after).all(|(b, a)| (*b == 0.0) == (*a == 0.0)));
         assert!(before[0] != after[0] && changed.ends_with('\n') && changed.contains(','));

@@ -138,8 +138,7 @@ fn size(case: &Case) -> Option<SpecLint> {
 /// Factors that are a percentage.
 fn large_factors(case: &Case) -> Vec<SpecLint> {
     let mut found = vec![];
-    let is_large = |(_, luminaire): &(usize, &Luminaire)| luminaire.flux_scale > LARGE_FACTOR;
-    if let Some((k, luminaire)) = case.scene.luminaires.iter().enumerate().find(is_large) {
+    if let Some((k, luminaire)) = case.scene.luminaires.iter().enumerate().find(|(_, l)| l.flux_scale > LARGE_FACTOR) {
         let (id, factor) = (&luminaire.id, luminaire.flux_scale);
         let message = format!("`{id}` gives {factor} times the light of its file");
         let help = format!("a factor of 1 changes nothing; {factor} % is {}", factor / 100.0);

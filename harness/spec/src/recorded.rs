@@ -285,9 +285,12 @@ mod tests {
         assert!(!read.has_any("a", ProcedureId::IndirectIlluminance));
     }
 
+    fn wrong(text: &str) -> RecordedError {
+        parse(text).unwrap_err()
+    }
+
     #[test]
     fn what_is_wrong_in_a_file_is_named_with_its_line() {
-        let wrong = |text: &str| parse(text).unwrap_err();
         let named = wrong("procedure,meter,value\ndirect_illuminance,p[0],1\ndirect_illuminance,p[1],bright\n");
         assert_eq!((named.line, named.message.as_str()), (Some(3), "`bright` is no number"));
         let twice = wrong("procedure,meter,value\ndirect_illuminance,p[0],1\ndirect_illuminance,p[0],2\n");
@@ -301,8 +304,7 @@ mod tests {
 
     #[test]
     fn a_spec_gives_no_other_setting() {
-        let settings = |text: &str| EngineSettings(serde_json::from_str(text).unwrap());
-        let read = |text: &str| RecordedSettings::from_settings(&settings(text));
+        let read = |text: &str| RecordedSettings::from_settings(&EngineSettings(serde_json::from_str(text).unwrap()));
         assert_eq!(read(r#"{"command": ["x"]}"#), None);
         let error = read(r#"{"readings": "a.csv", "command": ["x"]}"#).unwrap().unwrap_err();
         assert_eq!(error.key, "command");

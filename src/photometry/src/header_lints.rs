@@ -63,6 +63,12 @@ struct StatedNumber {
     is_count: bool,
 }
 
+impl StatedNumber {
+    fn is_flux(&self) -> bool {
+        matches!(self.unit.as_str(), "lm" | "lumen" | "lumens" | "klm")
+    }
+}
+
 /// Reports all contradictions.
 pub(crate) fn check(header: &Header<'_>, lints: &mut Lints) {
     let flux_lm = header.distribution.flux().value();
@@ -146,8 +152,7 @@ fn check_lumens(header: &Header<'_>, flux_lm: f64, name: &str, text: &str, line:
     let is_lamp = name.contains("LAMP") || lower.contains("lamp") || lower.contains("bare");
     let of = if is_lamp { FluxOf::Lamp } else { FluxOf::Luminaire };
     let numbers = numbers(text);
-    let is_lumen = |number: &&StatedNumber| matches!(number.unit.as_str(), "lm" | "lumen" | "lumens" | "klm");
-    let stated = match numbers.iter().find(is_lumen) {
+    let stated = match numbers.iter().find(|number| number.is_flux()) {
         Some(number) if number.unit == "klm" => Some(1000.0 * number.value),
         Some(number) => Some(number.value),
         None if is_flux_key => numbers.first().map(|number| number.value),
@@ -365,9 +370,12 @@ fn shorten(text: &str) -> String {
 mod tests {
     use super::*;
 
+    fn found(text: &str) -> Vec<(f64, String)> {
+        numbers(text).into_iter().map(|n| (n.value, n.unit)).collect()
+    }
+
     #[test]
     fn numbers_of_a_text_have_their_units() {
-        let found = |text: &str| numbers(text).into_iter().map(|n| (n.value, n.unit)).collect::<Vec<_>>();
         assert_eq!(found("1218 lm,14 W"), [(1218.0, "lm".into()), (14.0, "w".into())]);
         assert_eq!(found("3,200.5 lumens"), [(3200.5, "lumens".into())]);
         assert_eq!(found("1234,5lm 120 lm/W"), [(1234.5, "lm".into()), (120.0, "lm/w".into())]);

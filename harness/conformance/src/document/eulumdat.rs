@@ -23,6 +23,12 @@ pub(crate) struct LampSet {
     pub(crate) lumens: f64,
 }
 
+impl LampSet {
+    pub(crate) fn new(lamps: i32, lumens: f64) -> Self {
+        Self { lamps, lumens }
+    }
+}
+
 /// The C planes that every file lists.
 const LISTED_PLANES: u32 = 8;
 const PLANE_STEP_DEG: f64 = 45.0;
@@ -33,33 +39,32 @@ pub(super) const OPENING_M: [f64; 3] = [0.5, 0.2, 0.0];
 impl Eulumdat {
     /// A file of one lamp of 8000 lm.
     pub(crate) fn with_symmetry(symmetry: u8) -> Self {
-        Self { symmetry, conversion_factor: 1.0, sets: vec![LampSet { lamps: 1, lumens: 8000.0 }] }
+        Self { symmetry, conversion_factor: 1.0, sets: vec![LampSet::new(1, 8000.0)] }
     }
 
     /// Candela per number of the table for a reader with these mistakes.
     pub(super) fn factor(&self, table: &Table, mistakes: &[Mistake], variant: Option<Variant>) -> f64 {
-        let makes = |mistake: Mistake| mistakes.contains(&mistake);
         let (first, last) = (self.sets[0], self.sets[self.sets.len() - 1]);
         let lumens = match variant {
             Some(Variant::LastLampSet) => last.lumens,
             Some(Variant::LampSetsSummed) => self.sets.iter().map(|set| set.lumens).sum(),
             _ => first.lumens,
         };
-        let mut factor = if makes(Mistake::LumensNotScaled) { 1.0 } else { lumens / 1000.0 };
-        if !makes(Mistake::ConversionFactorIgnored) {
+        let mut factor = if mistakes.contains(&Mistake::LumensNotScaled) { 1.0 } else { lumens / 1000.0 };
+        if !mistakes.contains(&Mistake::ConversionFactorIgnored) {
             factor *= self.conversion_factor;
         }
-        if makes(Mistake::LampsMultiplied) {
+        if mistakes.contains(&Mistake::LampsMultiplied) {
             factor *= f64::from(first.lamps.unsigned_abs());
         }
-        if makes(Mistake::MinusOneMultiplied) && first.lamps < 0 {
+        if mistakes.contains(&Mistake::MinusOneMultiplied) && first.lamps < 0 {
             factor *= f64::from(first.lamps);
         }
         let (downward, output) = self.ratios_percent(table);
-        if makes(Mistake::OutputRatioApplied) {
+        if mistakes.contains(&Mistake::OutputRatioApplied) {
             factor *= output / 100.0;
         }
-        if makes(Mistake::DownwardFractionApplied) {
+        if mistakes.contains(&Mistake::DownwardFractionApplied) {
             factor *= downward / 100.0;
         }
         factor

@@ -68,18 +68,17 @@ impl Default for Lm63 {
 impl Lm63 {
     /// Candela per number of the table for a reader with these mistakes.
     pub(super) fn factor(&self, mistakes: &[Mistake], variant: Option<Variant>) -> f64 {
-        let makes = |mistake: Mistake| mistakes.contains(&mistake);
         let mut factor = 1.0;
-        if !makes(Mistake::MultiplierIgnored) {
+        if !mistakes.contains(&Mistake::MultiplierIgnored) {
             factor *= self.multiplier;
         }
-        if !makes(Mistake::BallastFactorIgnored) {
+        if !mistakes.contains(&Mistake::BallastFactorIgnored) {
             factor *= self.ballast_factor;
         }
         let applies_third_number = match self.edition {
-            Edition::Lm63_1986 | Edition::Lm63_1991 => !makes(Mistake::BallastLampFactorIgnored),
+            Edition::Lm63_1986 | Edition::Lm63_1991 => !mistakes.contains(&Mistake::BallastLampFactorIgnored),
             Edition::Lm63_1995 | Edition::Lm63_2002 => variant == Some(Variant::ThirdNumberApplied),
-            Edition::Lm63_2019 => makes(Mistake::FileGenerationApplied),
+            Edition::Lm63_2019 => mistakes.contains(&Mistake::FileGenerationApplied),
         };
         if applies_third_number {
             factor *= self.third_number;
@@ -87,16 +86,16 @@ impl Lm63 {
         if self.tilt == Tilt::Included && variant == Some(Variant::TiltApplied) {
             factor *= TILT_FACTOR;
         }
-        if makes(Mistake::LampsMultiplied) {
+        if mistakes.contains(&Mistake::LampsMultiplied) {
             factor *= f64::from(self.lamps);
         }
-        if makes(Mistake::LumensScaled) && self.lumens_per_lamp > 0.0 {
+        if mistakes.contains(&Mistake::LumensScaled) && self.lumens_per_lamp > 0.0 {
             factor *= f64::from(self.lamps) * self.lumens_per_lamp / 1000.0;
         }
-        if makes(Mistake::MinusOneMultiplied) && self.lumens_per_lamp < 0.0 {
+        if mistakes.contains(&Mistake::MinusOneMultiplied) && self.lumens_per_lamp < 0.0 {
             factor *= self.lumens_per_lamp;
         }
-        if makes(Mistake::FeetApplied) && self.is_in_feet {
+        if mistakes.contains(&Mistake::FeetApplied) && self.is_in_feet {
             factor *= SQUARE_METRES_PER_SQUARE_FOOT;
         }
         factor
@@ -147,10 +146,10 @@ impl Lm63 {
     fn head(&self, file: &PackFile) -> String {
         let mut lines: Vec<String> = vec![];
         lines.extend(self.edition.first_line().map(str::to_owned));
-        let is_labelled = self.edition == Edition::Lm63_1986;
-        let keyword = |name: &str| if is_labelled { String::new() } else { format!("[{name}] ") };
-        lines.push(format!("{}luxproof conformance pack, {}", keyword("TEST"), file.name));
-        lines.push(format!("{}luxproof", keyword("MANUFAC")));
+        let [test, manufacturer] =
+            if self.edition == Edition::Lm63_1986 { ["", ""] } else { ["[TEST] ", "[MANUFAC] "] };
+        lines.push(format!("{test}luxproof conformance pack, {}", file.name));
+        lines.push(format!("{manufacturer}luxproof"));
         if self.edition >= Edition::Lm63_2002 {
             lines.push("[TESTLAB] none: computed".into());
             lines.push("[ISSUEDATE] 2026-11-30".into());

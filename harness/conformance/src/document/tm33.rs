@@ -18,9 +18,8 @@ pub(crate) struct Tm33 {
 impl Tm33 {
     /// Candela per number of the table for a reader with these mistakes.
     pub(super) fn factor(&self, mistakes: &[Mistake]) -> f64 {
-        let makes = |mistake: Mistake| mistakes.contains(&mistake);
-        let mut factor = if makes(Mistake::MultiplierIgnored) { 1.0 } else { self.multiplier };
-        if let Some(lumens) = self.rated_lumens.filter(|_| makes(Mistake::LumensScaled)) {
+        let mut factor = if mistakes.contains(&Mistake::MultiplierIgnored) { 1.0 } else { self.multiplier };
+        if let Some(lumens) = self.rated_lumens.filter(|_| mistakes.contains(&Mistake::LumensScaled)) {
             factor *= lumens / 1000.0;
         }
         factor

@@ -115,7 +115,7 @@ pub(super) fn manage_engines(
                     let whole = [&[command][..], &names].concat().join(" ");
                     return Err(miette::miette!(
                         help = format!("write the command and its arguments in quotes: --adapter \"{whole}\""),
-                        "--adapter takes one program, and `{}` stands beside it",
+                        "--adapter takes one program, and `{}` follows it",
                         names.join(" ")
                     ));
                 }

@@ -16,7 +16,7 @@ fn ids_of(spec: &LuminaireSpec) -> Vec<String> {
     if ids.is_empty() { vec![spec.id.clone()] } else { ids }
 }
 
-/// Lets a procedure of one luminaire name an array by its id: it is of the first, since all of an array are alike.
+/// Lets a procedure of one luminaire name an array by its id: it means the first, since all have one file and rotation.
 pub(super) fn resolve_arrays(spec: &mut Spec) {
     for asked in spec.procedures.0.values_mut() {
         let (ProcedureRequest::Angles(AtAngles { luminaire, .. })

@@ -23,25 +23,27 @@ fn agreement(exact: &[Estimate], read: &[Estimate]) -> StatisticsAgreement {
     statistics(&recording("simulator", exact), recording("radiance", read)).agreement.unwrap()
 }
 
+fn bounded(value: f64, bound: f64) -> Estimate {
+    Estimate { value, uncertainty: Uncertainty::Bound(bound) }
+}
+
 #[test]
 fn mean_minimum_and_quotients_carry_the_errors_of_their_meters() {
-    let reading = |value, error| Estimate { value, uncertainty: Uncertainty::Bound(error) };
-    let subject = recording("radiance", &[reading(100.0, 1.0), reading(300.0, 3.0)]);
+    let subject = recording("radiance", &[bounded(100.0, 1.0), bounded(300.0, 3.0)]);
     let [s] = &built_in().statistics(&[], &[subject])[..] else { panic!("one set") };
     assert_eq!((s.meters, s.mean.value, s.minimum.value, s.agreement.is_none()), (2, 200.0, 100.0, true));
     assert_eq!((s.mean.uncertainty, s.minimum.uncertainty), (Uncertainty::Bound(2.0), Uncertainty::Bound(1.0)));
-    assert_eq!(s.maximum, Some(reading(300.0, 3.0)));
+    assert_eq!(s.maximum, Some(bounded(300.0, 3.0)));
     let (uniformity, diversity) = (s.uniformity.unwrap(), s.diversity.unwrap());
     assert_eq!((uniformity.value, diversity.value), (0.5, 100.0 / 300.0));
     // 1 / 200 + 100 * 2 / 200^2, and 1 / 300 + 100 * 3 / 300^2.
     assert!((uniformity.uncertainty.bound() - 0.01).abs() < 1e-12, "{uniformity:?}");
     assert!((diversity.uncertainty.bound() - 2.0 / 300.0).abs() < 1e-12, "{diversity:?}");
-    assert!(built_in().statistics(&[], &[recording("radiance", &[reading(1.0, 0.0)])]).is_empty());
+    assert!(built_in().statistics(&[], &[recording("radiance", &[bounded(1.0, 0.0)])]).is_empty());
 }
 
 #[test]
 fn the_minimum_is_no_surer_than_the_meters_that_may_be_it() {
-    let bounded = |value, bound| Estimate { value, uncertainty: Uncertainty::Bound(bound) };
     // The second may be as low as 95, and the least is no higher than 101 whatever the second is.
     let found = least(&[bounded(100.0, 1.0), bounded(105.0, 10.0)], TAIL).unwrap();
     assert_eq!(found, bounded(100.0, 5.0));
@@ -225,8 +227,7 @@ fn figures_pass_fail_and_wait_as_meters_do() {
 
 #[test]
 fn an_interval_of_a_figure_is_of_both_sides() {
-    let with = |error: f64| Estimate { value: 100.0, uncertainty: Uncertainty::Bound(error) };
-    let expanded = |theirs, own| agreement(&[with(theirs); 3], &[with(own); 3]).mean.expanded;
+    let expanded = |theirs, own| agreement(&[bounded(100.0, theirs); 3], &[bounded(100.0, own); 3]).mean.expanded;
     let (one, both) = (expanded(0.0, 0.3), expanded(0.3, 0.3));
     assert!((one - 0.9545 * 0.3).abs() < 1e-4 && both > 1.2 * one && both < 2.0 * one, "{one} {both}");
 }

@@ -69,9 +69,9 @@ pub fn solid_angle_sr([a, b, c]: [DVec3; 3]) -> f64 {
 /// The part of the whole sphere that the faces of a closed body fill around a point inside it, but for gaps of rounded corners.
 const CLOSED_PART: f64 = 0.999;
 
-/// Whether a point lies inside a closed body of these triangles, whose faces then fill the whole sphere around it.
+/// Whether a point lies inside a closed body of these triangles: its faces then fill the whole sphere around the point.
 ///
-/// An open one, a lampshade say, leaves a part of it. What faces inwards is a room of its own, as imported scenes have it.
+/// An open one, a lampshade say, leaves a part of it. What faces inwards is a room, as imported scenes have it.
 pub fn is_inside_closed(vertices_m: &[DVec3], triangles: &[[u32; 3]], point_m: DVec3) -> bool {
     let corners = triangles.iter().map(|t| t.map(|k| vertices_m[k as usize] - point_m));
     corners.map(solid_angle_sr).sum::<f64>() > CLOSED_PART * 4.0 * std::f64::consts::PI

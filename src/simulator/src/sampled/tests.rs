@@ -116,7 +116,7 @@ fn stated_errors_hold_in_a_slit_behind_a_body() {
     let mut scene = s2();
     scene.obstacles = vec![Obstacle { shape: cupboard, reflectance: 0.5 }];
     let behind = |y, z| Meter { position_m: DVec3::new(0.0035, y, z), normal: DVec3::NEG_X };
-    // What is dim is so beside what is bright.
+    // Two bright meters make the others dim.
     let meters = [behind(3.75, 0.9), behind(3.5, 1.3), up(2.0, 1.5, 0.8), up(4.0, 3.0, 0.8)];
     // The means of runs of two million paths a point. A few thousand may miss the way out, scatter by 2 %, and be wrong by a factor of four.
     let known = [(0.00264, 0.00003), (0.00546, 0.00006)];
