@@ -15,6 +15,17 @@ fn a_spec_is_written_as_usd_and_as_gltf_with_its_own_photometric_file() {
     let light = document["nodes"].as_array().unwrap().iter().find(|node| node["name"] == "lamp").unwrap();
     assert_eq!(light["translation"], serde_json::json!([3.0, 2.0, 2.5]));
     assert_eq!(light["extensions"]["EXT_lights_ies"]["multiplier"], 0.8);
+    // Back again: the same luminaire in the same room, with the same photometric file.
+    folder
+        .luxproof(&["import", "gltf/scene.gltf", "--out", "back"])
+        .exits(0)
+        .prints("luminaire: lamp, luminaire-0.ies");
+    let back = folder.read("back/spec.yaml");
+    for line in ["id: \"lamp\"", "at_m: [3, 2, 2.5]", "flux_scale: 0.8", "luminaire: \"lamp\",", "size_m: [6, 4, 3]"] {
+        assert!(back.contains(line), "{line}: {back}");
+    }
+    assert_eq!(folder.read("back/luminaire-0.ies"), LAMP);
+    folder.luxproof(&["check", "back/spec.yaml"]).exits(0);
     let usd = folder.read("usd/scene.usda");
     assert!(usd.contains("def SphereLight \"lamp\"") && usd.contains("float inputs:intensity = 3.2"), "{usd}");
 }

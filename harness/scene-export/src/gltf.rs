@@ -13,8 +13,8 @@ use serde_json::{Value, json};
 use crate::profile_name;
 use crate::soup::{Mesh, meshes};
 
-/// Turns z up to y up.
-const Y_UP: [f64; 4] = [-std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2];
+/// Turns z up to y up, column by column; a quaternion would round.
+const Y_UP: [f64; 16] = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
@@ -42,9 +42,9 @@ pub(crate) fn text(scene: &Scene, title: &str) -> String {
         }));
     }
     let children: Vec<usize> = (1..=nodes.len()).collect();
-    let mut all = vec![json!({"name": "z up", "rotation": Y_UP, "children": children})];
+    let mut all = vec![json!({"name": "z up", "matrix": Y_UP, "children": children})];
     if children.is_empty() {
-        all = vec![json!({"name": "z up", "rotation": Y_UP})];
+        all = vec![json!({"name": "z up", "matrix": Y_UP})];
     }
     all.extend(nodes);
     let materials: Vec<Value> = reflectances.iter().map(|rho| material(*rho)).collect();

@@ -59,7 +59,7 @@ fn a_gltf_light_is_where_the_luminaire_is() {
     let numbers = |value: &Value| value.as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect::<Vec<_>>();
     let quaternion = |node: &Value| DQuat::from_slice(&numbers(&node["rotation"]));
     let light = nodes.last().unwrap();
-    let root = DMat4::from_quat(quaternion(&nodes[0]));
+    let root = DMat4::from_cols_slice(&numbers(&nodes[0]["matrix"]));
     let local = DMat4::from_rotation_translation(quaternion(light), DVec3::from_slice(&numbers(&light["translation"])));
     let world = root * local;
     let luminaire = &scene.luminaires[0];

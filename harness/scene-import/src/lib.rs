@@ -7,6 +7,7 @@ mod closed;
 mod gltf;
 mod half_edges;
 mod hull;
+mod luminaires;
 mod obj;
 mod place;
 mod radiance;
@@ -22,6 +23,7 @@ use std::path::Path;
 use glam::DVec3;
 use itertools::Itertools;
 
+pub use luminaires::{ImportedLuminaire, LuminaireSummary};
 pub use place::{MeterGrid, Place};
 pub use room_detection::{Group, Part, RoomMesh, Walls};
 pub use summaries::{GroupSummary, ImportSummary, LeftOut, MeshSummary, RoomKind, RoomSummary, UsedMaterial};
@@ -71,6 +73,8 @@ pub struct Imported {
     pub origin_m: DVec3,
     /// Those that the room is not, in the scene's place; files by name.
     pub meshes: Vec<Part>,
+    /// The lights of the scene that a spec can have.
+    pub luminaires: Vec<ImportedLuminaire>,
     /// Where a luminaire and meters may be.
     pub place: Place,
     pub summary: ImportSummary,
@@ -133,6 +137,8 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
     let (low, high) = soup.extent();
     let around = around(&soup, |material| &raw.materials[material as usize].name, low, high);
     around.notes.iter().for_each(|note| raw.note(note));
+    let lights = std::mem::take(&mut raw.lights);
+    let luminaires = luminaires::luminaires(lights, up, options.unit_m, around.origin_m);
     let summary = ImportSummary {
         scene: path.display().to_string(),
         format: format.name(),
@@ -144,11 +150,12 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
         max_m: high.to_array(),
         room: around.summary,
         meshes: around.meshes.iter().map(Part::summarize).collect(),
+        luminaires: luminaires.iter().map(ImportedLuminaire::summarize).collect(),
         left_out: left_out(&raw, &chosen),
         notes: raw.notes,
     };
     let Around { walls, origin_m, meshes, place, .. } = around;
-    Ok(Imported { walls, origin_m, meshes, place, summary })
+    Ok(Imported { walls, origin_m, meshes, luminaires, place, summary })
 }
 
 /// The reflectance of each material that is taken; all that is wrong with the others at once.

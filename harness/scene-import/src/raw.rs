@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use luxproof_scene::geometry::polygon::Triangulator;
 
+use crate::luminaires::RawLight;
 use luxproof_spec::{SpecError, Trust};
 
 /// A scene of more triangles is imported in parts.
@@ -83,6 +84,7 @@ pub(super) struct Raw<'a> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) materials: Vec<Material>,
     pub(super) triangles: Vec<Triangle>,
+    pub(super) lights: Vec<RawLight>,
     pub(super) others: Others,
     /// Further notes, each once.
     pub(super) notes: Vec<String>,
@@ -129,6 +131,7 @@ impl<'a> Raw<'a> {
             scene,
             materials: vec![],
             triangles: vec![],
+            lights: vec![],
             others: Others::new(),
             notes: vec![],
             precision,

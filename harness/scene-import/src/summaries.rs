@@ -5,6 +5,8 @@ use std::fmt;
 use glam::DVec3;
 use serde::Serialize;
 
+use crate::luminaires::LuminaireSummary;
+
 /// The summary of an import.
 #[derive(Debug, Serialize)]
 pub struct ImportSummary {
@@ -22,6 +24,7 @@ pub struct ImportSummary {
     pub max_m: [f64; 3],
     pub room: RoomSummary,
     pub meshes: Vec<MeshSummary>,
+    pub luminaires: Vec<LuminaireSummary>,
     pub left_out: Vec<LeftOut>,
     pub notes: Vec<String>,
 }
@@ -128,6 +131,10 @@ impl fmt::Display for ImportSummary {
             writeln!(f, "mesh: {file}, reflectance {reflectance}, {triangles} triangles, {vertices} vertices")?;
         }
         more(f, self.meshes.len())?;
+        for l in self.luminaires.iter().take(MAX_LINES) {
+            writeln!(f, "luminaire: {}, {}, at {} m", l.id, l.photometry, box_of(l.at_m))?;
+        }
+        more(f, self.luminaires.len())?;
         for l in self.left_out.iter().take(MAX_LINES) {
             let place = l.place.as_ref().map(|place| format!(" ({place})")).unwrap_or_default();
             writeln!(f, "left out: {} {}{place}", l.count, l.what)?;

@@ -453,3 +453,115 @@ fn a_file_of_a_stranger_names_files_below_its_folder_alone() {
     let read = read_with(&[("a.obj", obj.as_bytes())], &given).unwrap();
     assert!(notes(&read).contains("does not lie below"), "{}", notes(&read));
 }
+
+/// A scene of a box room, a body and some luminaires, of random numbers.
+fn random_scene(random: &mut fastrand::Rng) -> luxproof_scene::Scene {
+    use luxproof_photometry::{LuminousIntensityDistribution, Photometry};
+    use luxproof_scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, orientation};
+    let mut between = |low: f64, high: f64| low + (high - low) * random.f64();
+    let size_m = DVec3::new(between(3.0, 9.0), between(3.0, 9.0), between(2.4, 4.0));
+    let reflectance = Reflectances {
+        floor: between(0.1, 0.3),
+        ceiling: between(0.6, 0.9),
+        wall_x_min: between(0.3, 0.4),
+        wall_x_max: between(0.4, 0.5),
+        wall_y_min: between(0.5, 0.6),
+        wall_y_max: between(0.3, 0.6),
+    };
+    let low_m = DVec3::new(between(0.3, 0.9), between(0.3, 0.9), between(0.1, 0.3));
+    let high_m = low_m + DVec3::new(between(0.2, 1.0), between(0.2, 1.0), between(0.2, 0.8));
+    let mut luminaires = vec![];
+    for k in 0..3 {
+        let c_deg = vec![0.0, 90.0, 180.0, 270.0, 360.0];
+        let mut candela: Vec<f64> = (0..20).map(|_| between(1.0, 900.0).round()).collect();
+        for gamma in [0, 3] {
+            (0..5).for_each(|c| candela[4 * c + gamma] = 300.0);
+        }
+        candela.copy_within(0..4, 16);
+        let table = LuminousIntensityDistribution::new(c_deg, vec![0.0, 50.0, 110.0, 180.0], candela).unwrap();
+        luminaires.push(Luminaire {
+            id: format!("lamp {k}"),
+            photometry: std::sync::Arc::new(Photometry::of(table)),
+            position_m: DVec3::new(between(1.0, 2.0), between(1.0, 2.0), between(1.5, 2.2)),
+            orientation: orientation(between(-180.0, 180.0), between(0.0, 180.0), between(-180.0, 180.0)),
+            flux_scale: between(0.2, 1.5),
+            model: LuminaireModel::Point,
+        });
+    }
+    let shape = Shape::Box { min_m: low_m, max_m: high_m };
+    Scene {
+        room: Some(Room { size_m, reflectance }),
+        obstacles: vec![Obstacle { shape, reflectance: between(0.1, 0.8) }],
+        luminaires,
+    }
+}
+
+#[test]
+fn ten_random_scenes_come_back_from_gltf_with_their_light() {
+    use luxproof_scene_export::{SceneFormat, export_scene};
+    let mut random = fastrand::Rng::with_seed(71);
+    for _ in 0..10 {
+        let scene = random_scene(&mut random);
+        let exported = export_scene(&scene, "random", SceneFormat::Gltf);
+        let mut files: Vec<(&str, &[u8])> =
+            exported.files.iter().map(|f| (f.name.as_str(), f.bytes.as_slice())).collect();
+        // The scene is the last of the files, and the first is read.
+        files.rotate_right(1);
+        let imported = read(&files).unwrap();
+        let room = cuboid(&imported);
+        let before = scene.room.unwrap();
+        // Coordinates of glTF are rounded to 1e-6 of the scene's size.
+        assert!(room.size_m.distance(before.size_m) < 1e-5, "{} {}", room.size_m, before.size_m);
+        for surface in luxproof_scene::geometry::Surface::ALL {
+            assert!((room.reflectance.of(surface) - before.reflectance.of(surface)).abs() < 1e-6);
+        }
+        assert_eq!(imported.luminaires.len(), 3);
+        for (luminaire, found) in scene.luminaires.iter().zip(&imported.luminaires) {
+            let [azimuth, tilt, roll] = found.rotate_deg;
+            let photometry = luxproof_photometry::lm63::parse(&found.bytes).unwrap();
+            let again = luxproof_scene::Luminaire {
+                photometry: std::sync::Arc::new(photometry),
+                position_m: found.at_m,
+                orientation: luxproof_scene::orientation(azimuth, tilt, roll),
+                flux_scale: found.flux_scale,
+                ..luminaire.clone()
+            };
+            assert_eq!(found.id, luminaire.id);
+            for target in [[0.1, 0.2, 0.1], [2.5, 0.4, 1.0], [1.0, 2.9, 2.3], [2.9, 2.9, 0.2]].map(DVec3::from) {
+                let lux = |lamp: &luxproof_scene::Luminaire| {
+                    let path = target - lamp.position_m;
+                    lamp.intensity_towards(path).value() / path.length_squared()
+                };
+                assert!((lux(&again) / lux(luminaire) - 1.0).abs() < 1e-6, "{} {}", lux(&again), lux(luminaire));
+            }
+        }
+    }
+}
+
+#[test]
+fn points_of_gltf_become_luminaires_and_other_lights_are_left_out() {
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut scene = random_scene(&mut random);
+    scene.luminaires.truncate(1);
+    let exported = luxproof_scene_export::export_scene(&scene, "lights", luxproof_scene_export::SceneFormat::Gltf);
+    let mut document: serde_json::Value = serde_json::from_slice(&exported.files.last().unwrap().bytes).unwrap();
+    let list = document["nodes"].as_array_mut().unwrap();
+    let count = list.len();
+    for light in 0..2 {
+        list.push(
+            serde_json::json!({"translation": [1, 2, 2], "extensions": {"KHR_lights_punctual": {"light": light}}}),
+        );
+    }
+    list[0]["children"].as_array_mut().unwrap().extend([count.into(), (count + 1).into()]);
+    document["extensions"]["KHR_lights_punctual"] =
+        serde_json::json!({"lights": [{"type": "point", "intensity": 40.0}, {"type": "spot"}]});
+    let text = document.to_string();
+    let files = [("scene.gltf", text.as_bytes()), ("luminaire-0.ies", &exported.files[0].bytes)];
+    let imported = read(&files).unwrap();
+    assert_eq!(imported.luminaires.len(), 2);
+    let point = &imported.luminaires[1];
+    assert!(point.id == "light-1" && point.at_m.distance(DVec3::new(1.0, 2.0, 2.0)) < 1e-9, "{point:?}");
+    let photometry = luxproof_photometry::lm63::parse(&point.bytes).unwrap();
+    assert_eq!(photometry.distribution.intensity(77.0, 120.0).value(), 40.0);
+    assert!(imported.summary.left_out.iter().any(|l| l.what.contains("no points") && l.count == 1));
+}

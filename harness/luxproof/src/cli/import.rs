@@ -16,7 +16,7 @@ use luxproof_console::{diagnose, warn};
 use luxproof_model::Exit;
 use luxproof_process::files::keep_shared;
 use luxproof_process::printable;
-use luxproof_scene_import::{Imported, MeterGrid, Options, RoomMesh, Up, Walls, import};
+use luxproof_scene_import::{Imported, ImportedLuminaire, MeterGrid, Options, RoomMesh, Up, Walls, import};
 use luxproof_spec::{Case, Trust, find_lints, suite};
 
 #[derive(Debug, Args)]
@@ -104,8 +104,13 @@ pub(super) fn run(args: &ImportArgs, trust: Trust) -> Result<Exit, Diagnostic> {
         write(&folder, &part.file, &part.obj())?;
     }
     // Nothing says how far walls are from the placeholder, so its opening is small.
-    let extent_m = imported.place.high_m - imported.place.low_m;
-    write(&folder, DOWNLIGHT, &downlight(0.1 * extent_m.min_element()))?;
+    if imported.luminaires.is_empty() {
+        let extent_m = imported.place.high_m - imported.place.low_m;
+        write(&folder, DOWNLIGHT, &downlight(0.1 * extent_m.min_element()))?;
+    }
+    for luminaire in &imported.luminaires {
+        keep_shared(&folder.join(&luminaire.file), &luminaire.bytes).into_diagnostic()?;
+    }
     // The spec comes last: once it exists, all files that it names exist.
     write(&folder, "spec.yaml", &text(&args.scene, &spec, &imported))?;
     match args.format {
@@ -114,7 +119,8 @@ pub(super) fn run(args: &ImportArgs, trust: Trust) -> Result<Exit, Diagnostic> {
     }
     let cases: Vec<Case> = suite(std::slice::from_ref(&spec), Trust::Own).map_err(diagnose)?;
     warn(&find_lints(&cases));
-    complain(&format!("next: put luminaires and meters into {}, then luxproof check it", spec.display()));
+    let what = if imported.luminaires.is_empty() { "luminaires and meters" } else { "meters" };
+    complain(&format!("next: put {what} into {}, then luxproof check it", spec.display()));
     Ok(Exit::Passed)
 }
 
@@ -130,9 +136,10 @@ fn text(scene: &Path, spec: &Path, imported: &Imported) -> String {
         .collect::<Vec<_>>()
         .concat();
     let obstacles = if meshes.is_empty() { meshes } else { format!("\nobstacles:\n{meshes}") };
+    let placeholders = if imported.luminaires.is_empty() { "luminaire and meters" } else { "meters" };
     let first = First {
         about: &format!(
-            "The geometry of {name}, by luxproof import; its luminaire and meters are placeholders: put yours there."
+            "The geometry of {name}, by luxproof import; its {placeholders} are placeholders: put yours there."
         ),
         file: spec,
         title: &name,
@@ -143,7 +150,27 @@ fn text(scene: &Path, spec: &Path, imported: &Imported) -> String {
         model: None,
         desk: desk_meters(imported),
     };
-    first.text()
+    with_luminaires(first.text(), &imported.luminaires)
+}
+
+/// The template's text with these luminaires instead of the placeholder.
+fn with_luminaires(text: String, luminaires: &[ImportedLuminaire]) -> String {
+    let (Some(first), Some((head, rest))) = (luminaires.first(), text.split_once("\nluminaires:\n")) else {
+        return text;
+    };
+    let Some((_, tail)) = rest.split_once("\nmeters:\n") else { return text };
+    let mut lines = String::new();
+    for ImportedLuminaire { id, file, at_m, rotate_deg: [azimuth, tilt, roll], flux_scale, .. } in luminaires {
+        let [x, y, z] = at_m.to_array();
+        lines += &format!(
+            "  - id: {id}\n    photometry: {file}\n    at_m: [{x}, {y}, {z}]\n    \
+             rotate_deg: {{azimuth: {azimuth}, tilt: {tilt}, roll: {roll}}}\n    flux_scale: {flux_scale}\n    model: point\n",
+            id = serde_json::Value::from(id.as_str()),
+        );
+    }
+    let tail =
+        tail.replacen("luminaire: lamp,", &format!("luminaire: {},", serde_json::Value::from(first.id.as_str())), 1);
+    format!("{head}\nluminaires:\n{lines}\nmeters:\n{tail}")
 }
 
 /// Triangles times meters that are looked at for meters inside bodies.

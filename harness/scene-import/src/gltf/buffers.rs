@@ -206,7 +206,7 @@ fn unit(value: f64, largest: f64, is_unit: bool) -> f64 {
 }
 
 /// The bytes of a data URI, or of a file beside the scene; or why not, and what to do.
-fn uri_bytes(scene: &Scene<'_>, uri: &str) -> Result<Vec<u8>, (String, &'static str)> {
+pub(super) fn uri_bytes(scene: &Scene<'_>, uri: &str) -> Result<Vec<u8>, (String, &'static str)> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (_, encoded) = data.split_once(";base64,").ok_or(("a data URI that is not base64".to_owned(), BROKEN))?;
         return STANDARD.decode(encoded).map_err(|e| (format!("its data URI: {e}"), BROKEN));

@@ -72,6 +72,7 @@ pub(super) struct Document {
     pub(super) buffers: List<Buffer>,
     #[serde(default)]
     pub(super) animations: List<IgnoredAny>,
+    pub(super) extensions: Option<DocumentExtensions>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -87,6 +88,7 @@ pub(super) struct SceneOf {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Node {
+    pub(super) name: Option<String>,
     #[serde(default)]
     pub(super) children: List<usize>,
     pub(super) mesh: Option<usize>,
@@ -106,7 +108,47 @@ pub(super) struct NodeExtensions {
     #[serde(rename = "EXT_mesh_gpu_instancing")]
     pub(super) instancing: Option<IgnoredAny>,
     #[serde(rename = "KHR_lights_punctual")]
-    pub(super) light: Option<IgnoredAny>,
+    pub(super) light: Option<LightOf>,
+    #[serde(rename = "EXT_lights_ies")]
+    pub(super) profile: Option<LightOf>,
+}
+
+/// A light at a node.
+#[derive(Debug, Deserialize)]
+pub(super) struct LightOf {
+    pub(super) light: usize,
+    /// Of `EXT_lights_ies`.
+    pub(super) multiplier: Option<f64>,
+    pub(super) color: Option<[f64; 3]>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct DocumentExtensions {
+    #[serde(rename = "KHR_lights_punctual")]
+    pub(super) punctual: Option<Lights<PunctualLight>>,
+    #[serde(rename = "EXT_lights_ies")]
+    pub(super) profiles: Option<Lights<LightProfile>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(bound = "T: Deserialize<'de>")]
+pub(super) struct Lights<T> {
+    #[serde(default)]
+    pub(super) lights: List<T>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct PunctualLight {
+    #[serde(rename = "type")]
+    pub(super) kind: String,
+    /// In candela.
+    pub(super) intensity: Option<f64>,
+    pub(super) color: Option<[f64; 3]>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct LightProfile {
+    pub(super) uri: Option<String>,
 }
 
 #[derive(Debug, Deserialize)]

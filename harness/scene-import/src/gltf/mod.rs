@@ -3,6 +3,7 @@
 mod buffers;
 mod colours;
 mod document;
+mod lights;
 
 use std::collections::BTreeSet;
 
@@ -19,7 +20,8 @@ use document::{Document, MaterialOf, Node, Primitive};
 const PRECISION: f64 = 1e-6;
 
 /// Extensions that change nothing that is taken, or are looked at.
-const KNOWN: [&str; 6] = [
+const KNOWN: [&str; 7] = [
+    "EXT_lights_ies",
     "KHR_mesh_quantization",
     "KHR_lights_punctual",
     "KHR_texture_transform",
@@ -200,9 +202,7 @@ impl Reader<'_, '_> {
         if extensions.is_some_and(|all| all.instancing.is_some()) {
             return Err(self.raw.scene.fault(None, format!("nodes[{k}] is many (EXT_mesh_gpu_instancing)"), UNPACK));
         }
-        if extensions.is_some_and(|all| all.light.is_some()) {
-            self.raw.leave_out("lights (KHR_lights_punctual)", 1, None);
-        }
+        self.lights(k, node, transform)?;
         let Some(mesh) = node.mesh else { return Ok(()) };
         let document = self.document;
         let of = document
