@@ -7,6 +7,7 @@ use luxproof_model::{EngineName, HiddenVariant, ProcedureId, Report, Request, Ro
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::cell::inherit_limits;
 use crate::evidence::ReportIndex;
 use crate::{Capabilities, CapabilityId, CardsError, CaseEvidence, Cell, ReleaseLabel, judge, slug};
 
@@ -317,8 +318,9 @@ fn renderer_card(
         let before = cards.last();
         let mut cells = vec![];
         for capability in &capabilities.capabilities {
-            let cases: Vec<CaseEvidence> =
+            let mut cases: Vec<CaseEvidence> =
                 release.evidence.remove(&capability.id).map(|cases| cases.into_values().collect()).unwrap_or_default();
+            inherit_limits(&mut cases);
             let cell = judge(capability, &cases);
             cells.push(cell_card(&folder, &label, capability.id.clone(), cell.clone(), before));
             let of_release = ReleaseEvidence { release: label.clone(), is_recorded: release.is_recorded, cell, cases };

@@ -68,7 +68,7 @@ pub struct Spread {
     pub hidden: Option<Deviation>,
     /// The seeds of the hidden variants.
     pub seeds: Vec<u64>,
-    /// Whether the public cases show no fault and the hidden ones do.
+    /// Whether no public case shows a fault, and a variant of one that is right does.
     pub is_public_only: bool,
 }
 
@@ -165,6 +165,40 @@ pub fn judge(capability: &Capability, evidence: &[CaseEvidence]) -> Cell {
         points: evidence.iter().filter_map(CaseEvidence::measurement).map(|m| m.verdicts.all).sum(),
         missing,
         spread,
+    }
+}
+
+/// How much larger than that of the public case the bound of a hidden variant may be with the same cause.
+const SAME_CAUSE_FACTOR: f64 = 2.0;
+
+/// Gives hidden variants the known limits of their public case.
+///
+/// Known deviations are on record by content, so that none is about a variant. Where a limit of the method explains the public case,
+/// a variant that deviates in the same size shows the same limit, and no fault that the public case lacks.
+pub(crate) fn inherit_limits(evidence: &mut [CaseEvidence]) {
+    let public = evidence.iter().filter(|e| e.hidden.is_none() && e.faults().is_empty());
+    let limits = public.flat_map(|e| {
+        let named = e.limits().into_iter().filter(|limit| !limit.text.is_empty());
+        named.map(|limit| (e.case.clone(), e.procedure, limit.text.clone(), limit.bound()))
+    });
+    let limits: Vec<_> = limits.collect();
+    for variant in evidence.iter_mut().filter(|e| e.hidden.is_some()) {
+        let (case, procedure) = (variant.case.clone(), variant.procedure);
+        let Outcome::Measured(measurement) = &mut variant.outcome else { continue };
+        for remark in &mut measurement.remarks {
+            let Remark::Fault { points, worst: Some(worst), at, .. } = remark else { continue };
+            let known = limits.iter().find(|(of, what, _, bound)| {
+                *of == case && *what == procedure && worst.bound() <= SAME_CAUSE_FACTOR * bound
+            });
+            if let Some((_, _, text, _)) = known {
+                *remark = Remark::Limit {
+                    text: format!("as in the public case: {text}"),
+                    points: *points,
+                    worst: Some(*worst),
+                    at: at.clone(),
+                };
+            }
+        }
     }
 }
 
@@ -338,12 +372,17 @@ fn spread(public: &[&CaseEvidence], hidden: &[&CaseEvidence]) -> Option<Spread> 
     }
     let is_varied = |e: &&&CaseEvidence| hidden.iter().any(|h| h.case == e.case && h.procedure == e.procedure);
     let paired: Vec<&CaseEvidence> = public.iter().filter(is_varied).copied().collect();
-    let has_fault = |all: &[&CaseEvidence]| all.iter().any(|e| !e.faults().is_empty());
+    let is_spotless = |e: &&CaseEvidence| e.measurement().is_some() && e.faults().is_empty() && e.limits().is_empty();
+    let is_exposed = |e: &CaseEvidence| {
+        let of_public = paired.iter().copied().filter(|p| p.case == e.case && p.procedure == e.procedure);
+        !e.faults().is_empty() && of_public.into_iter().any(|p| is_spotless(&p))
+    };
+    let has_public_fault = public.iter().any(|e| !e.faults().is_empty());
     Some(Spread {
         public: worst_of(paired.iter().copied()),
         hidden: worst_of(hidden.iter().copied()),
         seeds: seeds.into_iter().collect(),
-        is_public_only: paired.iter().any(|e| e.measurement().is_some()) && !has_fault(public) && has_fault(hidden),
+        is_public_only: !has_public_fault && hidden.iter().any(|e| is_exposed(e)),
     })
 }
 
@@ -549,6 +588,26 @@ mod tests {
         assert_eq!(spread.public.map(|d| d.value), Some(0.0));
         assert_eq!(spread.hidden.map(|d| (d.value, d.measure)), Some((0.05, Measure::Relative)));
         assert_eq!((found.tested_cases, found.hidden_variants), (3, 1));
+    }
+
+    #[test]
+    fn a_limit_of_a_public_case_explains_its_variant_if_that_deviates_no_more_than_twice_as_much() {
+        for (off, is_limited) in [(-0.15, true), (-0.5, false)] {
+            let mut report = known("limit");
+            let with_variant =
+                super::super::fixtures::report(ENGINE, "1.0", &[MadeCase::new("a").hidden(7).off(off, 0.001)]);
+            report.cases.extend(with_variant.cases);
+            report.recordings.extend(with_variant.recordings);
+            report.comparisons.extend(with_variant.comparisons);
+            let capability = &capabilities(3).capabilities[0];
+            let mut evidence =
+                ReportIndex::new(&report).evidence(capability, &EngineName::from(ENGINE), &RunId::of(&report));
+            inherit_limits(&mut evidence);
+            let found = judge(capability, &evidence);
+            assert_eq!(matches!(found.standing, Standing::Limited { .. }), is_limited, "{found:?}");
+            // The public case is not right, so nothing is tuned to it.
+            assert!(!found.spread.unwrap().is_public_only);
+        }
     }
 
     #[test]

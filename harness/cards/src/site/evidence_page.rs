@@ -149,7 +149,7 @@ fn points(release: &ReleaseEvidence, case: &CaseEvidence) -> Markup {
     let label = format!("{}{hidden}, {}", case.case, case.procedure.title().to_lowercase());
     html! {
         @if !measurement.points.is_empty() {
-            h4 { (label) }
+            h3 { (label) }
             (table(&format!("{}: {label}, {}", release.release, case.reported_as), &HEADS, &html! {
                 @for point in &measurement.points {
                     tr {

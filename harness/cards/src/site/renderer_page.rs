@@ -73,6 +73,9 @@ fn row(renderer: &RendererCard, capability: &Capability) -> Markup {
 fn short(standing: &Standing) -> String {
     match standing {
         Standing::Accurate { worst: Some(worst) } => worst.bound_text(),
+        Standing::Limited { worst: Some(worst), .. } | Standing::Wrong { worst: Some(worst), .. } => {
+            format!("{}, {}", standing.word(), worst.bound_text())
+        }
         other => other.word().to_owned(),
     }
 }
