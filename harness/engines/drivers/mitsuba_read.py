@@ -220,7 +220,8 @@ def trace(scene, p, d, seed):
         except TypeError:  # Mitsuba before 3.6 takes plain numbers alone.
             sampler.seed(seed, len(p))
         ray = mi.RayDifferential3f(mi.Point3f(*columns(p)), mi.Vector3f(*columns(d)))
-        if isinstance(integrator, mi.ad.integrators.common.ADIntegrator):
+        # By its name: where its module is has changed over the releases.
+        if type(integrator).__name__ == "PRBIntegrator":
             radiance = integrator.sample(dr.ADMode.Primal, scene, sampler, ray, None, None, mi.Bool(True))[0]
         else:
             radiance = integrator.sample(scene, sampler, ray)[0]
