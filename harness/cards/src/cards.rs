@@ -315,18 +315,18 @@ fn renderer_card(
     let mut evidence: BTreeMap<CapabilityId, Vec<ReleaseEvidence>> = BTreeMap::new();
     // The oldest first, so that each is compared with the one before.
     for (label, mut release) in releases {
-        let before = cards.last();
         let mut cells = vec![];
         for capability in &capabilities.capabilities {
             let mut cases: Vec<CaseEvidence> =
                 release.evidence.remove(&capability.id).map(|cases| cases.into_values().collect()).unwrap_or_default();
             inherit_limits(&mut cases);
             let cell = judge(capability, &cases);
+            let before = tested_before(&cards, &capability.id);
             cells.push(cell_card(&folder, &label, capability.id.clone(), cell.clone(), before));
             let of_release = ReleaseEvidence { release: label.clone(), is_recorded: release.is_recorded, cell, cases };
             evidence.entry(capability.id.clone()).or_default().push(of_release);
         }
-        let changes = before.map(|before| changes(before, &cells)).unwrap_or_default();
+        let changes = changes(&cards, &cells);
         let Release { versions, is_recorded, runs, .. } = release;
         cards.push(ReleaseCard { release: label, versions, is_recorded, runs, cells, changes });
     }
@@ -343,13 +343,12 @@ fn cell_card(
     label: &ReleaseLabel,
     capability: CapabilityId,
     cell: Cell,
-    before: Option<&ReleaseCard>,
+    before: Option<(&ReleaseCard, &CellCard)>,
 ) -> CellCard {
-    let earlier = before.and_then(|before| Some((before, before.cell(&capability)?)));
-    let since = match earlier {
+    let since = match before {
         None => None,
         Some((_, earlier)) if earlier.cell.standing.key() == cell.standing.key() => earlier.since.clone(),
-        Some(_) => Some(label.clone()),
+        Some(_) => Some(label.clone()).filter(|_| !cell.standing.is_untested()),
     };
     let page = format!("renderers/{folder}/{capability}.html#{}", anchor(label));
     let (headline, explanation) = (cell.standing.headline(), cell.standing.explanation());
@@ -371,15 +370,21 @@ impl ReleaseCard {
 /// A bound that grows or shrinks by more than this factor may be a change.
 const CHANGED_BOUND: f64 = 2.0;
 
-fn changes(before: &ReleaseCard, cells: &[CellCard]) -> Vec<Change> {
+/// The last release in which a capability was tested, with its cell. What was not tested has not changed.
+fn tested_before<'a>(earlier: &'a [ReleaseCard], capability: &CapabilityId) -> Option<(&'a ReleaseCard, &'a CellCard)> {
+    let cells = earlier.iter().rev().filter_map(|release| Some((release, release.cell(capability)?)));
+    cells.into_iter().find(|(_, cell)| !cell.cell.standing.is_untested())
+}
+
+fn changes(earlier: &[ReleaseCard], cells: &[CellCard]) -> Vec<Change> {
     let mut found = vec![];
-    for cell in cells {
-        let Some(earlier) = before.cell(&cell.capability) else { continue };
-        if has_changed(&earlier.cell, &cell.cell) {
+    for cell in cells.iter().filter(|cell| !cell.cell.standing.is_untested()) {
+        let Some((release, before)) = tested_before(earlier, &cell.capability) else { continue };
+        if has_changed(&before.cell, &cell.cell) {
             found.push(Change {
                 capability: cell.capability.clone(),
-                before: before.release.clone(),
-                from: earlier.headline.clone(),
+                before: release.release.clone(),
+                from: before.headline.clone(),
                 to: cell.headline.clone(),
             });
         }
@@ -438,6 +443,22 @@ mod tests {
         );
         assert_eq!(pages.len(), 1);
         assert_eq!(pages[0].releases.len(), 4);
+    }
+
+    #[test]
+    fn a_release_that_was_not_tested_changes_nothing_and_hides_no_change() {
+        let untested = report("mitsuba@3.6.4", "9", &[MadeCase::new("a").off(0.0, 0.0)]);
+        let reports =
+            [release("mitsuba@3.5.2", "2026-03-01", 0.002), untested, release("mitsuba@3.7.1", "2026-03-03", 0.3)];
+        let (cards, _) = cards(&reports).unwrap();
+        let [newest, middle, oldest] = &cards.renderers[0].releases[..] else { panic!("{cards:?}") };
+        assert!(middle.cells[0].cell.standing.is_untested());
+        assert_eq!((oldest.changes.len(), middle.changes.len(), newest.changes.len()), (0, 0, 1));
+        assert_eq!(newest.changes[0].before.as_str(), "3.5.2");
+        assert_eq!(
+            (middle.cells[0].since.as_ref(), newest.cells[0].since.as_ref().map(ReleaseLabel::as_str)),
+            (None, Some("3.7.1"))
+        );
     }
 
     #[test]

@@ -106,6 +106,11 @@ impl Standing {
         }
     }
 
+    /// Whether nothing is known.
+    pub const fn is_untested(&self) -> bool {
+        matches!(self, Self::NotTested { .. })
+    }
+
     /// The deviation with the largest bound behind it.
     pub const fn worst(&self) -> Option<Deviation> {
         match self {
@@ -352,6 +357,15 @@ fn limited(evidence: &[CaseEvidence]) -> Option<Standing> {
     let (named, open): (Vec<_>, Vec<_>) =
         evidence.iter().flat_map(CaseEvidence::limits).partition(|flaw| !flaw.text.is_empty());
     let (what, from) = match gravest(named, evidence) {
+        // Where it declines there is no deviation: a bound would say something about other cases.
+        Some((worst, from)) if worst.worst.is_none() && undecided.is_none() => {
+            let elsewhere = worst_of(evidence.iter()).map(|worst| format!("; elsewhere within {}", worst.bound_text()));
+            return Some(Standing::Limited {
+                what: worst.text,
+                from: from + &elsewhere.unwrap_or_default(),
+                worst: None,
+            });
+        }
         Some((worst, from)) => ([Some(worst.text), undecided].into_iter().flatten().join("; "), from),
         None => (undecided.unwrap_or_default(), gravest(open, evidence)?.1),
     };
@@ -526,7 +540,9 @@ mod tests {
             [MadeCase::new("a").off(0.0, 0.0), MadeCase::new("b").off(0.0, 0.0), MadeCase::new("c").unsupported()];
         let found = cell(&some, 2);
         let Standing::Limited { what, from, .. } = &found.standing else { panic!("{found:?}") };
-        assert_eq!((what.as_str(), from.as_str()), ("it declines: only boxes", "in 1 of 3 cases: c"));
+        assert_eq!(what, "it declines: only boxes");
+        assert_eq!(from, "in 1 of 3 cases: c; elsewhere within 0.0001 %");
+        assert_eq!(found.standing.headline(), "limited");
         let crash = cell(&three(MadeCase::new("a").failing("crash", "signal 11")), 2);
         assert!(crash.standing.explanation().starts_with("it fails: signal 11"), "{crash:?}");
         let declined = cell(&three(MadeCase::new("a").failing("declined", "no bodies")), 2);

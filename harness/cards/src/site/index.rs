@@ -139,8 +139,8 @@ fn matrix_cell(renderer: &RendererCard, cell: &CellCard) -> Markup {
     html! {
         td class={ "s-" (standing.key()) } data-renderer=(renderer.name) {
             a.cell href=(cell.page) {
-                (sign(standing)) " " (cell.headline)
-                @if let Standing::Wrong { fault: text, .. } | Standing::Limited { what: text, .. } = standing {
+                (sign(standing)) " " (cell.headline.replace(" %", "\u{a0}%"))
+                @if let Standing::Wrong { fault: text, .. } | Standing::Limited { what: text, .. } | Standing::NotSupported { reason: text } = standing {
                     span.why { (shortened(first_clause(text), SHOWN_LETTERS)) }
                 }
                 @if let Some(since) = &cell.since { span.since { "since " (shortened(since.as_str(), 16)) } }
@@ -151,7 +151,10 @@ fn matrix_cell(renderer: &RendererCard, cell: &CellCard) -> Markup {
 
 /// A text up to its evidence: diagnoses have it behind a colon.
 fn first_clause(text: &str) -> &str {
-    text.split_once(": that explains").map_or(text, |(clause, _)| clause)
+    /// A shorter clause says only that a cause follows.
+    const SHORTEST: usize = 14;
+    let clause = text.split_once(": ").map_or(text, |(clause, _)| clause);
+    if clause.len() < SHORTEST { text } else { clause }
 }
 
 /// What hidden variants are, and their seeds.

@@ -76,7 +76,7 @@ fn a_cell_has_a_sign_a_text_and_a_class_and_leads_to_the_evidence_of_its_release
     let index = content(&files, "index.html");
     let cell = index.split("<td ").find(|cell| cell.contains("data-renderer=\"rays\"")).unwrap();
     assert!(
-        cell.starts_with("class=\"s-wrong\"") && cell.contains("✕") && cell.contains("wrong, up to 51 %"),
+        cell.starts_with("class=\"s-wrong\"") && cell.contains("✕") && cell.contains("wrong, up to 51\u{a0}%"),
         "{cell}"
     );
     assert!(cell.contains("href=\"renderers/rays/direct.html#r-2.0\"") && cell.contains("since 2.0"), "{cell}");
