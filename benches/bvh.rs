@@ -1,4 +1,4 @@
-//! Rays a second against scene size, and the time and memory to build the tree: `cargo bench --bench bvh`.
+//! Rays a second against scene size, and the time and memory to build the tree: `cargo bench -p luxproof-physics-tests --bench bvh`.
 
 use divan::counter::ItemsCount;
 use divan::{AllocProfiler, Bencher};

@@ -1,4 +1,4 @@
-//! Throughput of the photometric readers in MB/s and of what is asked of a distribution: `cargo bench --bench photometry`.
+//! Throughput of the photometric readers in MB/s and of what is asked of a distribution: `cargo bench -p luxproof-physics-tests --bench photometry`.
 
 use divan::counter::BytesCount;
 use divan::{Bencher, black_box};

@@ -1,4 +1,4 @@
-//! Error against time for cases S1 and S2, one more meter, direct light, peak memory: `cargo bench --bench simulator`.
+//! Error against time for cases S1 and S2, one more meter, direct light, peak memory: `cargo bench -p luxproof-physics-tests --bench simulator`.
 //!
 //! Prints a table in Markdown, which `ci/benchmarks/error_against_time.py` draws. Times are the best of a few runs, since whatever else a machine
 //! does only adds, and those of the processor where the system tells them.

@@ -1,4 +1,4 @@
-"""Draws the table that `cargo bench --bench simulator` prints: `error_against_time.py < table > picture.svg`.
+"""Draws the table that `cargo bench -p luxproof-physics-tests --bench simulator` prints: `error_against_time.py < table > picture.svg`.
 
 Bounds as lines, errors as dots; colours and words serve on white and on black."""
 import math, sys
