@@ -569,11 +569,11 @@ mod tests {
         // A file that it rejects gives no wrong light; the place of its log is not published.
         for recording in &mut report.recordings {
             recording.failure =
-                Some("ies2rad failed: unsupported type\nall its messages are in /home/me/log".to_owned());
+                Some("ies2rad failed:   - /home/me/lib.so\n  - /home/me/b.so\nunsupported type\nall its messages are in /home/me/log".to_owned());
             recording.failure_kind = Some(luxproof_model::FailureKind::Crash);
         }
         let rejected =
-            Standing::NotSupported { reason: "it rejects the file: ies2rad failed: unsupported type".to_owned() };
+            Standing::NotSupported { reason: "it does not read the file: ies2rad failed; unsupported type".to_owned() };
         assert_eq!(judged(&report), rejected);
     }
 

@@ -263,15 +263,22 @@ fn failed(kind: Option<FailureKind>, reason: String, capability: &Capability) ->
         Some(kind) if !kind.is_an_answer() => Outcome::NotRun { reason },
         // It said so: a user gets no wrong light.
         Some(FailureKind::Crash | FailureKind::Refused) if capability.reads_files => {
-            Outcome::Unsupported { reason: format!("it rejects the file: {reason}") }
+            Outcome::Unsupported { reason: format!("it does not read the file: {reason}") }
         }
         _ => Outcome::Failed { reason },
     }
 }
 
-/// The message of an engine in one line, without the place of its log on the machine that ran it.
+/// The message of an engine in one line, without the places of files on the machine that ran it.
 fn public_text(reason: &str) -> String {
-    reason.lines().filter(|line| !line.starts_with("all its messages are in ")).join("; ")
+    let lines = reason.lines().filter(|line| !line.starts_with("all its messages are in "));
+    lines.map(without_path).filter(|line| !line.is_empty()).join("; ")
+}
+
+/// A line up to the first absolute path in it.
+fn without_path(line: &str) -> &str {
+    let end = line.find(" /").or_else(|| line.starts_with('/').then_some(0)).unwrap_or(line.len());
+    line[..end].trim().trim_end_matches(['-', ':', ' '])
 }
 
 /// The name of a case in capabilities.
