@@ -6,12 +6,16 @@ use sha2::{Digest, Sha256};
 /// Letters of a name that a slug keeps.
 const MAX_LETTERS: usize = 48;
 
+/// Whether a character may stand in a path as it is.
+fn is_plain(c: char) -> bool {
+    c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '.' | '-' | '_')
+}
+
 /// A name as a part of a path: lower-case letters, digits, dots, hyphens and underscores.
 ///
 /// A name with anything else gets a part of its hash, so that two names never share a folder, whatever the file system ignores.
 /// No slug begins with a dot, and none is empty.
 pub fn slug(name: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '.' | '-' | '_');
     let has_start = name.starts_with(|c: char| c.is_ascii_alphanumeric());
     if has_start && name.len() <= MAX_LETTERS && name.chars().all(is_plain) && !name.ends_with('.') && name != "index" {
         return name.to_owned();

@@ -197,11 +197,10 @@ type Scaling<'a> = &'a dyn Fn(&PackFile) -> f64;
 
 #[test]
 fn normalised_intensities_are_a_variant_and_hide_no_mistake() {
-    let flux = |file: &PackFile| Expected::of(file).flux_lm.linear;
     let normalisations: [(Variant, Scaling); 5] = [
         (Variant::NormalisedToPeak, &|file| 1.0 / file.peak_cd()),
-        (Variant::NormalisedToFlux, &|file| 1.0 / flux(file)),
-        (Variant::NormalisedToMean, &|file| 4.0 * std::f64::consts::PI / flux(file)),
+        (Variant::NormalisedToFlux, &|file| 1.0 / Expected::of(file).flux_lm.linear),
+        (Variant::NormalisedToMean, &|file| 4.0 * std::f64::consts::PI / Expected::of(file).flux_lm.linear),
         (Variant::RadiantBy683, &|_| 1.0 / 683.0),
         (Variant::RadiantBy179, &|_| 1.0 / 179.0),
     ];

@@ -43,10 +43,11 @@ pub(crate) fn meshes(scene: &Scene) -> Vec<Mesh> {
 
 /// The corners and outward triangles of a box; bit `a` of a corner's index says which end of axis `a` it is at.
 fn cuboid(min_m: DVec3, max_m: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let end = |index: u32, bit: u32, low: f64, high: f64| if index & (1 << bit) == 0 { low } else { high };
-    let corner =
-        |k: u32| DVec3::new(end(k, 0, min_m.x, max_m.x), end(k, 1, min_m.y, max_m.y), end(k, 2, min_m.z, max_m.z));
+    let corners_m = (0..8_u32).map(|index| {
+        let is_high = glam::BVec3::new(index & 1 != 0, index & 2 != 0, index & 4 != 0);
+        DVec3::select(is_high, max_m, min_m)
+    });
     let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles = quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    ((0..8).map(corner).collect(), triangles)
+    (corners_m.collect(), triangles)
 }

@@ -37,6 +37,15 @@ fn file(exported: &ExportedScene, name: &str) -> String {
     String::from_utf8(found.bytes.clone()).unwrap()
 }
 
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect()
+}
+
+/// glTF's y is up: (x, y, z) is (x, z, -y) there.
+fn to_gltf(v: DVec3) -> DVec3 {
+    DVec3::new(v.x, v.z, -v.y)
+}
+
 #[test]
 fn every_face_of_a_scene_looks_where_light_is() {
     for mesh in soup::meshes(&scene()) {
@@ -56,15 +65,14 @@ fn a_gltf_light_is_where_the_luminaire_is() {
     let exported = export_scene(&scene, "a room", SceneFormat::Gltf);
     let document: Value = serde_json::from_str(&file(&exported, "scene.gltf")).unwrap();
     let nodes = document["nodes"].as_array().unwrap();
-    let numbers = |value: &Value| value.as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect::<Vec<_>>();
-    let quaternion = |node: &Value| DQuat::from_slice(&numbers(&node["rotation"]));
     let light = nodes.last().unwrap();
     let root = DMat4::from_cols_slice(&numbers(&nodes[0]["matrix"]));
-    let local = DMat4::from_rotation_translation(quaternion(light), DVec3::from_slice(&numbers(&light["translation"])));
+    let local = DMat4::from_rotation_translation(
+        DQuat::from_slice(&numbers(&light["rotation"])),
+        DVec3::from_slice(&numbers(&light["translation"])),
+    );
     let world = root * local;
     let luminaire = &scene.luminaires[0];
-    // glTF's y is up: (x, y, z) is (x, z, -y) there.
-    let to_gltf = |v: DVec3| DVec3::new(v.x, v.z, -v.y);
     assert!(world.transform_point3(DVec3::ZERO).distance(to_gltf(luminaire.position_m)) < 1e-12);
     for axis in [DVec3::X, DVec3::Y, DVec3::NEG_Z] {
         let expected = to_gltf(luminaire.orientation * axis);

@@ -152,14 +152,9 @@ fn sphere() -> (&'static str, String, f64) {
 
 /// A rotation and a translation; USD multiplies rows from the left.
 fn matrix(rotation: DMat3, at_m: DVec3) -> String {
-    let row = |v: DVec3, last: u8| format!("({}, {}, {}, {last})", v.x, v.y, v.z);
-    format!(
-        "( {}, {}, {}, {} )",
-        row(rotation.x_axis, 0),
-        row(rotation.y_axis, 0),
-        row(rotation.z_axis, 0),
-        row(at_m, 1)
-    )
+    let rows = [(rotation.x_axis, 0), (rotation.y_axis, 0), (rotation.z_axis, 0), (at_m, 1)];
+    let rows = rows.map(|(v, last)| format!("({}, {}, {}, {last})", v.x, v.y, v.z));
+    format!("( {} )", rows.join(", "))
 }
 
 fn tuple(v: DVec3) -> String {
