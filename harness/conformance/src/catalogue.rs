@@ -16,7 +16,10 @@ const HALF_FROM_C0: [f64; 5] = [0.0, 45.0, 90.0, 135.0, 180.0];
 const HALF_FROM_C90: [f64; 5] = [90.0, 135.0, 180.0, 225.0, 270.0];
 /// EULUMDAT stores the half about C 0 of a luminaire that is symmetric in C 90 - C 270.
 const HALF_ABOUT_C0: [f64; 5] = [-90.0, -45.0, 0.0, 45.0, 90.0];
-const QUADRANT: [f64; 3] = [0.0, 45.0, 90.0];
+/// Without 45 degrees, at which planes that are repeated answer what mirrored ones do.
+const QUADRANT: [f64; 4] = [0.0, 30.0, 60.0, 90.0];
+/// EULUMDAT files of the pack have eight planes in the whole circle.
+const EULUMDAT_QUADRANT: [f64; 3] = [0.0, 45.0, 90.0];
 const ALL_GAMMAS: [f64; 7] = [0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0];
 const LOWER_GAMMAS: [f64; 4] = [0.0, 30.0, 60.0, 90.0];
 const UPPER_GAMMAS: [f64; 4] = [90.0, 120.0, 150.0, 180.0];
@@ -54,7 +57,7 @@ fn type_c(planes: &[f64], gammas: &[f64], form: ClosedForm, factor: f64) -> Pack
         form,
         table: Table::tabulate(Goniometer::C, planes, gammas, form, factor),
         document: Document::Lm63(Lm63::default()),
-        directions: without_edges(nodes_of_type_c(), gammas),
+        directions: without_edges(nodes_of_type_c(planes), gammas),
         variants: vec![],
     }
 }
@@ -68,13 +71,15 @@ fn without_edges(directions: Vec<AskedDirection>, gammas: &[f64]) -> Vec<AskedDi
     directions.into_iter().filter(|asked| !is_edge(asked.gamma_deg)).collect()
 }
 
-/// Directions on nodes of every table of type C in steps of 45 and 30 degrees, or beyond its end.
-fn nodes_of_type_c() -> Vec<AskedDirection> {
+/// Directions on nodes of a table of type C with these planes, in steps of 30 degrees of gamma, or beyond its end.
+fn nodes_of_type_c(planes: &[f64]) -> Vec<AskedDirection> {
+    let oblique = planes.iter().copied().find(|c| (1.0..90.0).contains(c)).unwrap_or(45.0);
     let mut directions = vec![AskedDirection::exact(0.0, 0.0)];
     for gamma in [30.0, 60.0, 90.0, 120.0, 150.0] {
         directions.extend([0.0, 90.0, 180.0, 270.0].map(|c| AskedDirection::exact(c, gamma)));
     }
-    directions.extend([45.0, 135.0, 225.0, 315.0].map(|c| AskedDirection::exact(c, 60.0)));
+    let mirrored = [oblique, 180.0 - oblique, 180.0 + oblique, 360.0 - oblique];
+    directions.extend(mirrored.map(|c| AskedDirection::exact(c, 60.0)));
     directions.push(AskedDirection::exact(0.0, 180.0));
     directions
 }
@@ -224,7 +229,7 @@ fn lm63_ranges() -> Vec<PackFile> {
         PackFile {
             name: "interpolation.ies",
             feature: "Directions between the nodes: interpolations differ, and none is wrong.",
-            directions: nodes_of_type_c()
+            directions: nodes_of_type_c(&WHOLE_CIRCLE)
                 .into_iter()
                 .chain(between.map(|(c, gamma)| AskedDirection::between(c, gamma)))
                 .collect(),
@@ -308,7 +313,7 @@ fn eulumdat_files() -> Vec<PackFile> {
             1 => (&[0.0][..], ClosedForm::Axial),
             2 => (&HALF_FROM_C0[..], ClosedForm::MirroredInC0),
             3 => (&HALF_ABOUT_C0[..], ClosedForm::MirroredInC90),
-            4 => (&QUADRANT[..], ClosedForm::MirroredInBoth),
+            4 => (&EULUMDAT_QUADRANT[..], ClosedForm::MirroredInBoth),
             _ => (&WHOLE_CIRCLE[..], ClosedForm::Skew),
         };
         PackFile { name, feature, document: Document::Eulumdat(document), ..type_c(planes, &ALL_GAMMAS, form, factor) }

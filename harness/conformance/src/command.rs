@@ -182,7 +182,7 @@ fn describe(verdict: &FileVerdict) -> String {
                 }
                 Some(PartialExplanation { mistakes, explained, answered, .. }) => {
                     let names = mistakes.iter().map(|mistake| mistake.id()).join(" and ");
-                    format!("{explained} of {answered} answers are those of {names}, which is expected here")
+                    format!("{explained} of {answered} answers are those of {names}")
                 }
             };
             format!("WRONG: {answer_cd:.3} cd at C {c_deg:.1} gamma {gamma_deg:.1}, expected {expected}; {known}")

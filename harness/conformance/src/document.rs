@@ -62,6 +62,18 @@ impl Document {
         }
     }
 
+    /// Rated lumens by each way to count sets of lamps: the first, the last or all of them.
+    pub(crate) fn lamp_lumens_of_sets(&self) -> Vec<f64> {
+        match self {
+            Self::Eulumdat(eulumdat) | Self::Gldf(eulumdat) if eulumdat.sets.len() > 1 => {
+                let lumens = eulumdat.sets.iter().map(|set| set.lumens);
+                let last = lumens.clone().next_back();
+                last.into_iter().chain([lumens.sum()]).chain(self.lamp_lumens()).collect()
+            }
+            _ => self.lamp_lumens().into_iter().collect(),
+        }
+    }
+
     /// Rated lumens of all lamps, where the file has relative photometry.
     pub(crate) fn lamp_lumens(&self) -> Option<f64> {
         match self {

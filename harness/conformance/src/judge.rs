@@ -261,12 +261,11 @@ impl<'a> ExaminedFile<'a> {
         Err(self.worst_answer(answers, Some(scaled)))
     }
 
-    /// The answer with the largest deviation from what mistakes give that explain most answers.
+    /// The answer with the largest deviation from what is right.
     fn worst_answer(&self, answers: Answers, nearest: Option<PartialExplanation>) -> FileVerdict {
-        let mistakes = nearest.as_ref().map(|nearest| nearest.mistakes.as_slice()).unwrap_or_default();
         let scale = nearest.as_ref().map_or(1.0, |nearest| nearest.scale);
         let variant = nearest.as_ref().and_then(|nearest| nearest.variant);
-        let predictions = ModelReader { mistakes, variant }.predict(self.file);
+        let predictions = ModelReader { mistakes: &[], variant }.predict(self.file);
         let deviation = |k: usize, answer: f64| {
             let answer = answer / scale;
             (predictions[k].least - answer).max(answer - predictions[k].most)

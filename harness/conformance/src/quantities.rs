@@ -114,7 +114,7 @@ fn find_flux_fault(file: &PackFile, answer_lm: f64, factor: f64) -> Option<Quant
 
 fn find_lumens_fault(file: &PackFile, answer_lm: f64) -> Option<QuantityFault> {
     let expected_lm = file.document.lamp_lumens();
-    if expected_lm.is_some_and(|expected| is_same(answer_lm, expected)) {
+    if file.document.lamp_lumens_of_sets().into_iter().any(|expected| is_same(answer_lm, expected)) {
         return None;
     }
     let of_one = expected_lm.is_some_and(|expected| is_same(answer_lm * f64::from(file.document.lamps()), expected));

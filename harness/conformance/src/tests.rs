@@ -308,6 +308,10 @@ fn wrong_numbers_besides_the_intensities_are_named() {
     );
     let swapped = quantities("isym-0.ldt", &|answer| answer.opening_m = Some([0.2, 0.5, 0.0]));
     assert_eq!(swapped, [QuantityFault::WidthAndLengthSwapped]);
+    // Sets of lamps are counted by the reader's own variant.
+    for lumens in [8000.0, 12000.0, 20000.0] {
+        assert_eq!(quantities("lamp-sets.ldt", &|answer| answer.lamp_lumens = Some(lumens)), []);
+    }
     let absolute = quantities("plain.ies", &|answer| answer.lamp_lumens = Some(1.0));
     assert_eq!(absolute, [QuantityFault::LampLumens { answer_lm: 1.0, expected_lm: None }]);
 }
