@@ -2,7 +2,9 @@
 
 use std::fs;
 
+use luxproof_process::digest::hexadecimal;
 use serde_json::Value;
+use sha2::{Digest as _, Sha256};
 
 use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS, adapter};
 
@@ -42,6 +44,16 @@ def answer(job):
     is_at_home = len(os.listdir(os.path.dirname(os.path.abspath(__file__)))) > 3
     for reading in found.get('readings', []):
         reading['illuminance_lx'] *= 1 if is_at_home else 1.05
+    return found
+";
+
+/// 5 % off everywhere.
+const BRIGHT: &str = "
+exact_answer = answer
+def answer(job):
+    found = exact_answer(job)
+    for reading in found.get('readings', []):
+        reading['illuminance_lx'] *= 1.05
     return found
 ";
 
@@ -119,9 +131,13 @@ fn an_honest_adapter_is_accurate_in_public_and_hidden_cases() {
 
 /// A site of the public case by another adapter, and a submission as a bundle.
 fn submission(adapter: &str) -> Folder {
+    submission_that_exits(adapter, 0)
+}
+
+fn submission_that_exits(adapter: &str, code: i32) -> Folder {
     let folder = folder(adapter);
     fs::create_dir_all(folder.path("site-run")).unwrap();
-    folder.run(&[]).exits(0);
+    folder.run(&[]).exits(code);
     folder.luxproof(&["bundle", "out", "--out", "mine.zip"]).exits(0);
     folder.write("site-run/spec.yaml", &[ROOM, TWO_METERS, DIRECT].concat());
     folder.write("site-run/lamp.ies", LAMP);
@@ -170,6 +186,32 @@ fn what_does_not_reproduce_is_refused_with_its_reason_and_changes_nothing() {
     // Without trust its program does not run at all.
     folder.luxproof(&["cards", "add", "mine.zip", "--site", "site"]).exits(2);
     assert_eq!(folder.read("site/cards.json"), before);
+}
+
+/// Writes `SHA256SUMS` of a bundle anew for its report.
+fn seal_report(folder: &Folder, bundle: &str) {
+    let report = fs::read(folder.path(&format!("{bundle}/run/report.json"))).unwrap();
+    let digest = hexadecimal(&Sha256::digest(report));
+    let sums = folder.read(&format!("{bundle}/SHA256SUMS"));
+    let line = |line: &str| {
+        if line.ends_with("  run/report.json") { format!("{digest}  run/report.json\n") } else { format!("{line}\n") }
+    };
+    folder.write(&format!("{bundle}/SHA256SUMS"), &sums.lines().map(line).collect::<String>());
+}
+
+#[test]
+fn what_a_submitted_report_says_beyond_its_readings_is_not_published() {
+    let folder = submission_that_exits(&adapter_with(BRIGHT), 1);
+    folder.luxproof(&["bundle", "out", "--out", "forged"]).exits(0);
+    let path = folder.path("forged/run/report.json");
+    let mut report = luxproof_report_file::read(&path).unwrap();
+    for comparison in report.comparisons.iter_mut().filter(|c| *c.key.engine == *"mine") {
+        comparison.verdict = luxproof_model::Verdict::Undecided;
+    }
+    luxproof_report_file::keep(&mut report, &path).unwrap();
+    seal_report(&folder, "forged");
+    folder.luxproof(&["cards", "add", "forged", "--site", "site", "--trusted"]).exits(0);
+    assert_eq!(cell(&folder, "mine")["standing"]["state"], "wrong");
 }
 
 #[test]

@@ -29,3 +29,20 @@ fn a_spec_is_written_as_usd_and_as_gltf_with_its_own_photometric_file() {
     let usd = folder.read("usd/scene.usda");
     assert!(usd.contains("def SphereLight \"lamp\"") && usd.contains("float inputs:intensity = 3.2"), "{usd}");
 }
+
+#[test]
+fn a_strangers_scene_names_a_profile_no_more_often_than_a_spec_has_luminaires() {
+    let spec = SKEW_ROOM.replace("rotate_deg: {azimuth: 30, tilt: 20}, ", "");
+    let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
+    folder.luxproof(&["export", "spec.yaml", "--engine", "gltf", "--out", "gltf"]).exits(0);
+    let mut document = folder.json("gltf/scene.gltf");
+    let nodes = document["nodes"].as_array_mut().unwrap();
+    let light = nodes.iter().find(|node| node["name"] == "lamp").unwrap().clone();
+    let first = nodes.len();
+    nodes.extend(std::iter::repeat_n(light, 600));
+    let children = nodes[0]["children"].as_array_mut().unwrap();
+    children.extend((first..first + 600).map(serde_json::Value::from));
+    folder.write("gltf/many.gltf", &document.to_string());
+    folder.luxproof(&["import", "--untrusted", "gltf/many.gltf"]).exits(2).complains("more than 500 lights");
+    assert!(!folder.path("many").exists());
+}

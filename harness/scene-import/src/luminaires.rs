@@ -29,6 +29,16 @@ pub(super) enum Profile {
     Isotropic(f64),
 }
 
+impl Profile {
+    /// The bytes that the scene states.
+    pub(super) fn bytes(&self) -> usize {
+        match self {
+            Self::File(bytes) => bytes.len(),
+            Self::Isotropic(_) => 0,
+        }
+    }
+}
+
 /// A light as a luminaire of a spec.
 #[derive(Clone, Debug)]
 pub struct ImportedLuminaire {

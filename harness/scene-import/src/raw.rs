@@ -85,6 +85,8 @@ pub(super) struct Raw<'a> {
     pub(super) materials: Vec<Material>,
     pub(super) triangles: Vec<Triangle>,
     pub(super) lights: Vec<RawLight>,
+    /// Bytes of the profiles of all lights.
+    pub(super) profile_bytes: usize,
     pub(super) others: Others,
     /// Further notes, each once.
     pub(super) notes: Vec<String>,
@@ -132,6 +134,7 @@ impl<'a> Raw<'a> {
             materials: vec![],
             triangles: vec![],
             lights: vec![],
+            profile_bytes: 0,
             others: Others::new(),
             notes: vec![],
             precision,

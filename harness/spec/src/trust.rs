@@ -101,6 +101,11 @@ impl Trust {
         self.limits().triangles
     }
 
+    /// The most luminaires of a scene.
+    pub const fn max_luminaires(self) -> usize {
+        self.limits().luminaires
+    }
+
     /// The most bytes of the files that a spec or scene names, all together.
     pub const fn max_named_bytes(self) -> usize {
         self.limits().bytes

@@ -277,7 +277,7 @@ fn add(args: &AddArgs, engines: &EngineRoot, trust: Trust) -> Result<Exit, Diagn
         observer: &progress,
         ..super::audit_options(engines.clone(), scratch.path().join("again"))
     };
-    let (reproduction, _) = opened.again(options()).map_err(not_audited)?;
+    let (reproduction, again) = opened.again(options()).map_err(not_audited)?;
     if let Some(reason) = not_reproduced(&reproduction, &opened.report) {
         return Ok(refuse(args, &reason));
     }
@@ -288,7 +288,9 @@ fn add(args: &AddArgs, engines: &EngineRoot, trust: Trust) -> Result<Exit, Diagn
         within: reproduction.count(Outcome::Within),
         bundle_sha256: opened.sha256.clone(),
     };
-    let (run, report, file) = (CardRun::of(&opened.report, verification), opened.report.clone(), opened.report_file());
+    // The page shows what was read here: a stranger's report may say anything but its readings.
+    let run = CardRun { id: RunId::of(&opened.report), ..CardRun::of(&again, verification) };
+    let file = scratch.path().join("again").join(REPORT_FILE);
     let added = format!(
         "{}: {} to the byte, {} within uncertainties",
         run.title,
@@ -296,7 +298,7 @@ fn add(args: &AddArgs, engines: &EngineRoot, trust: Trust) -> Result<Exit, Diagn
         reproduction.count(Outcome::Within)
     );
     sources.retain(|source| source.run.id != run.id);
-    sources.push(Source { run, report, file, bundle: BundleSource::Opened(Box::new(opened)) });
+    sources.push(Source { run, report: again, file, bundle: BundleSource::Opened(Box::new(opened)) });
     sources.extend(hidden);
     let cards = write_site(&args.site, &published.capabilities, sources, trust)?;
     print(&format!("added {added}\n"))?;

@@ -117,7 +117,7 @@ pub(super) fn run(args: &ImportArgs, trust: Trust) -> Result<Exit, Diagnostic> {
         TextOrJson::Terminal => print(&imported.summary.to_string())?,
         TextOrJson::Json => print(&json(&imported.summary)?)?,
     }
-    let cases: Vec<Case> = suite(std::slice::from_ref(&spec), Trust::Own).map_err(diagnose)?;
+    let cases: Vec<Case> = suite(std::slice::from_ref(&spec), trust).map_err(diagnose)?;
     warn(&find_lints(&cases));
     let what = if imported.luminaires.is_empty() { "luminaires and meters" } else { "meters" };
     complain(&format!("next: put {what} into {}, then luxproof check it", spec.display()));

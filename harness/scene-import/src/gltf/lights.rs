@@ -24,9 +24,25 @@ impl Reader<'_, '_> {
                 continue;
             };
             let position = transform.transform_point3(DVec3::ZERO);
+            self.raw.profile_bytes = self.raw.profile_bytes.saturating_add(profile.bytes());
             self.raw.lights.push(RawLight { name: node.name.clone(), position, axes, profile, flux_scale });
+            self.check_limits(k)?;
         }
         Ok(())
+    }
+
+    /// Each light becomes a luminaire with its own file, however often a scene names one profile.
+    fn check_limits(&self, k: usize) -> Result<(), SpecError> {
+        let trust = self.raw.scene.trust;
+        let (luminaires, bytes) = (trust.max_luminaires(), trust.max_named_bytes());
+        let message = if self.raw.lights.len() > luminaires {
+            format!("nodes[{k}]: more than {luminaires} lights")
+        } else if self.raw.profile_bytes > bytes {
+            format!("nodes[{k}]: the light profiles of all nodes hold more than {bytes} bytes")
+        } else {
+            return Ok(());
+        };
+        Err(self.raw.scene.fault(None, message, "leave lights out, or import it without --untrusted if it is yours"))
     }
 
     /// The photometric file of a light of `EXT_lights_ies`, and the factor of its intensities.
