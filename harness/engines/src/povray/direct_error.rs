@@ -211,7 +211,7 @@ impl<'a> Lights<'a> {
     }
 
     /// Returns the illuminance by those parts of a luminaire that a meter sees. `candela` gives the intensity of the whole
-    /// luminaire towards a direction of its own frame.
+    /// luminaire towards a direction in its frame.
     fn sum_lx(&self, luminaire: &Luminaire, parts: &[Part], meter: &Meter, candela: impl Fn(DVec3) -> f64) -> f64 {
         let to_local = luminaire.orientation.transpose();
         let mut sum_lx = 0.0;

@@ -203,7 +203,7 @@ fn write_shared(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::write(path, bytes)
 }
 
-/// Copies a file for everybody to read, whoever may read the original.
+/// Copies a file and lets all users read the copy.
 fn copy_shared(from: &Path, to: &Path) -> io::Result<()> {
     io::copy(&mut File::open(from)?, &mut File::create(to)?).map(drop)
 }

@@ -1,4 +1,4 @@
-//! `luxproof init`: a first spec that runs, commented, with a photometric file beside it; made of options, or of answers.
+//! `luxproof init`: writes a first spec with comments and a photometric file, from options or from answers to questions.
 
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::{Path, PathBuf};
