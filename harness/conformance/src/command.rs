@@ -6,7 +6,8 @@ use clap::{Args, Subcommand, ValueEnum};
 use itertools::Itertools as _;
 use luxproof_console::{json, print};
 use luxproof_model::Exit;
-use luxproof_process::{files, printable};
+use luxproof_process::printable::{Quoted, quoted};
+use luxproof_process::{files, foreign_json};
 use miette::{IntoDiagnostic, Report as Diagnostic, miette};
 
 use crate::catalogue::PACK_VERSION;
@@ -55,11 +56,8 @@ enum Format {
     Json,
 }
 
-/// The largest submission: that of the pack has some 50 kB.
-const MAX_RESULTS_BYTES: u64 = 16 << 20;
-
-/// The most characters of a name or reason that is printed.
-const MAX_NAME_CHARS: usize = 200;
+/// The largest submission: that of the pack has some 50 kB. In memory it takes up to forty times as much.
+const MAX_RESULTS_BYTES: u64 = 2 << 20;
 
 /// Writes the pack, or does what its subcommand says.
 pub fn run(args: &ConformanceArgs, version: &str) -> Result<Exit, Diagnostic> {
@@ -102,8 +100,9 @@ fn check(args: &CheckArgs) -> Result<Exit, Diagnostic> {
     let path = &args.results;
     let bytes = files::read_bounded(path, MAX_RESULTS_BYTES)
         .map_err(|error| refuse(path, &error.to_string(), "name the file with the answers of your reader"))?;
-    let submission: Submission = serde_json::from_slice(&bytes)
-        .map_err(|error| refuse(path, &error.to_string(), "results.schema.json of the pack describes the file"))?;
+    let submission: Submission = foreign_json::from_slice(&bytes).map_err(|error| {
+        refuse(path, &quoted(&error.to_string()), "results.schema.json of the pack describes the file")
+    })?;
     let judgement = judge(&submission).map_err(|error| refuse(path, &error.to_string(), error.help()))?;
     match args.format {
         Format::Json => print(&json(&judgement)?)?,
@@ -119,7 +118,7 @@ pub(crate) fn format_judgement(judgement: &Judgement) -> String {
     let refused = count(|file| matches!(file.verdict, FileVerdict::Refused { .. }));
     let faults = count(FileJudgement::is_fault) - refused;
     let absent = count(|file| file.verdict == FileVerdict::NotSubmitted);
-    let reader = printable::line(&judgement.reader, MAX_NAME_CHARS);
+    let reader = Quoted(&judgement.reader);
     let mut text = format!(
         "{reader}, conformance pack {}: {right} right, {faults} wrong, {refused} not read, {absent} not submitted\n",
         judgement.pack
@@ -187,7 +186,7 @@ fn describe(verdict: &FileVerdict) -> String {
             };
             format!("WRONG: {answer_cd:.3} cd at C {c_deg:.1} gamma {gamma_deg:.1}, expected {expected}; {known}")
         }
-        FileVerdict::Refused { reason } => format!("not read: {}", printable::line(reason, MAX_NAME_CHARS)),
+        FileVerdict::Refused { reason } => format!("not read: {}", Quoted(reason)),
         FileVerdict::Unanswered => "no answer".into(),
         FileVerdict::NotSubmitted => "not submitted".into(),
     }

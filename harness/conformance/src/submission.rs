@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use luxproof_process::printable::Quoted;
+
 use crate::catalogue::PACK_VERSION;
 use crate::pack_file::PackFile;
 
@@ -77,7 +79,7 @@ pub(crate) const MAX_RELATIVE_UNCERTAINTY: f64 = 0.01;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SubmissionError {
     /// Of another version of the pack.
-    #[error("the submission answers version {found} of the pack, and this program judges {PACK_VERSION}")]
+    #[error("the submission answers version {} of the pack, and this program judges {PACK_VERSION}", Quoted(.found))]
     Version {
         /// The version of the submission.
         found: String,
@@ -89,7 +91,7 @@ pub enum SubmissionError {
         found: f64,
     },
     /// A file that is not in the pack.
-    #[error("the pack has no file `{name}`")]
+    #[error("the pack has no file `{}`", Quoted(.name))]
     UnknownFile {
         /// The name.
         name: String,

@@ -4,10 +4,86 @@ use std::fmt;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode, SourceSpan};
 
-use crate::complain;
+use crate::complain_of;
 use luxproof_process::files::{MAX_BYTES, read_bounded};
-use luxproof_process::printable::{self, is_unprintable};
+use luxproof_process::printable::{is_unprintable, line, message};
 use luxproof_spec::{Faults, SpecError};
+
+/// Any error in the form that miette draws: printable, and of a length that a person can read.
+#[derive(Debug)]
+pub(crate) struct DrawnError {
+    message: String,
+    cause: Option<Box<DrawnCause>>,
+    help: Option<String>,
+    /// The error itself: of its excerpts and parts each is made printable where it is made.
+    error: Report,
+}
+
+/// A cause of an error, and its own cause.
+#[derive(Debug)]
+struct DrawnCause {
+    message: String,
+    cause: Option<Box<Self>>,
+}
+
+impl From<Report> for DrawnError {
+    fn from(error: Report) -> Self {
+        let causes: Vec<String> =
+            error.chain().skip(1).take(MAX_CAUSES).map(|cause| message(&cause.to_string())).collect();
+        let cause = causes.into_iter().rfold(None, |cause, message| Some(Box::new(DrawnCause { message, cause })));
+        let help = error.help().map(|help| message(&help.to_string()));
+        Self { message: message(&error.to_string()), cause, help, error }
+    }
+}
+
+/// The most causes of an error that are shown.
+const MAX_CAUSES: usize = 20;
+
+impl fmt::Display for DrawnError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for DrawnError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.cause.as_deref().map(|cause| cause as _)
+    }
+}
+
+impl fmt::Display for DrawnCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for DrawnCause {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.cause.as_deref().map(|cause| cause as _)
+    }
+}
+
+impl Diagnostic for DrawnError {
+    fn severity(&self) -> Option<Severity> {
+        self.error.severity()
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.error.source_code()
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        self.error.labels()
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        self.error.related()
+    }
+}
 
 /// A fault in the form that miette draws.
 #[derive(Debug)]
@@ -89,14 +165,14 @@ pub fn diagnose(faults: impl Into<Faults>) -> Report {
 /// Prints the lints of specs on standard error.
 pub fn warn(lints: &[SpecError]) {
     for lint in lints {
-        complain(&format!("{:?}", Report::new(DrawnFault::from_error(lint, Severity::Warning))));
+        complain_of(Report::new(DrawnFault::from_error(lint, Severity::Warning)));
     }
 }
 
 impl DrawnFault {
     /// Reads the line of an error from its file.
     fn from_error(error: &SpecError, severity: Severity) -> Self {
-        let name = printable::line(&error.file.display().to_string(), MAX_MESSAGE_CHARS);
+        let name = one_line(&error.file.display().to_string());
         let is_shown = error.line.is_some() && !error.is_withheld;
         let bytes = is_shown.then(|| read_bounded(&error.file, MAX_BYTES).ok()).flatten();
         let text = bytes.map(|bytes| printable_text(&bytes));
@@ -111,16 +187,13 @@ impl DrawnFault {
             let span = span(&text, error.line?, error.column.unwrap_or(1))?;
             Some((NamedSource::new(name, text), span))
         });
-        let help = error.help.as_deref().filter(|help| !help.is_empty()).map(shorten);
-        Self { message: format!("{place}: {}", shorten(&error.message)), help, severity, excerpt }
+        let help = error.help.as_deref().filter(|help| !help.is_empty()).map(one_line);
+        Self { message: format!("{place}: {}", one_line(&error.message)), help, severity, excerpt }
     }
 }
 
 /// The longest line of a file that is drawn, in bytes.
 const MAX_LINE_BYTES: usize = 2000;
-/// The longest message, in characters.
-const MAX_MESSAGE_CHARS: usize = 2000;
-
 /// The text of a file with replacements for unprintable characters.
 fn printable_text(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
@@ -130,13 +203,9 @@ fn printable_text(bytes: &[u8]) -> String {
     text.replace(is_replaced, &char::REPLACEMENT_CHARACTER.to_string())
 }
 
-/// A printable message of limited length.
-fn shorten(text: &str) -> String {
-    let text = printable::lines(text);
-    match text.char_indices().nth(MAX_MESSAGE_CHARS) {
-        Some((end, _)) => format!("{} ...", &text[..end]),
-        None => text,
-    }
+/// A message about a spec, which quotes it: one printable line of limited length.
+fn one_line(text: &str) -> String {
+    message(&line(text, usize::MAX))
 }
 
 /// The byte range of the word at a line and a column, both counted from 1.

@@ -4,7 +4,7 @@ use std::io::{self, IsTerminal};
 use std::process::ExitCode;
 
 use luxproof::cli::Cli;
-use luxproof_console::complain;
+use luxproof_console::{complain_of, complain_styled};
 use luxproof_model::Exit;
 use luxproof_process::process;
 use tracing::Level;
@@ -30,7 +30,7 @@ fn main() -> ExitCode {
         tracing::warn!(%error, "a file that grows beyond `ulimit -f` will end luxproof");
     }
     let exit = cli.run().unwrap_or_else(|error| {
-        complain(&format!("{error:?}"));
+        complain_of(error);
         Exit::Usage
     });
     ExitCode::from(exit.code())
@@ -42,7 +42,7 @@ struct LogWriter;
 impl io::Write for LogWriter {
     /// An event is written at once.
     fn write(&mut self, event: &[u8]) -> io::Result<usize> {
-        complain(String::from_utf8_lossy(event).trim_end_matches('\n'));
+        complain_styled(String::from_utf8_lossy(event).trim_end_matches('\n'));
         Ok(event.len())
     }
 

@@ -207,7 +207,7 @@ impl Reading {
             match reading.result {
                 Ok(photometry) => accepted.push(photometry),
                 Err(error) => {
-                    luxproof_console::complain(&format!("{:?}", diagnose(error)));
+                    luxproof_console::complain_of(diagnose(error));
                     is_complete = false;
                 }
             }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use luxproof_photometry::units::Lumen;
 use luxproof_photometry::{Lint, LuminousOpening, Photometry, Symmetry};
+use luxproof_process::printable::quoted;
 use serde::Serialize;
 use serde_json::json;
 
@@ -162,7 +163,7 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut rows = vec![("format", self.format.clone())];
         if let Some(luminaire) = &self.luminaire {
-            rows.push(("luminaire", luminaire.lines().next().unwrap_or_default().to_owned()));
+            rows.push(("luminaire", quoted(luminaire.lines().next().unwrap_or_default())));
         }
         let up = if self.flux_lm > 0.0 { 100.0 * self.flux_up_lm / self.flux_lm } else { 0.0 };
         let (lm, up_lm, down_lm) = (self.flux_lm, self.flux_up_lm, self.flux_down_lm);

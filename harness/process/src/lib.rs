@@ -4,6 +4,7 @@ pub mod clock;
 pub mod digest;
 pub mod envelope;
 pub mod files;
+pub mod foreign_json;
 pub mod output_lock;
 pub mod printable;
 pub mod process;

@@ -1,8 +1,65 @@
 //! Text of strangers and of programs, as a terminal, a log, a page or Markdown may show it.
 
 use std::borrow::Cow;
+use std::fmt;
+use std::path::Path;
 
 pub use luxproof_photometry::is_unprintable;
+
+/// The most characters of a name or sentence that a message quotes.
+const MAX_QUOTED_CHARS: usize = 200;
+
+/// A text from outside within a message: one printable line of at most 200 characters.
+#[derive(Clone, Copy, Debug)]
+pub struct Quoted<'a>(pub &'a str);
+
+impl fmt::Display for Quoted<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // `pad` keeps the width that a table asks for.
+        f.pad(&quoted(self.0))
+    }
+}
+
+/// The same as a text.
+pub fn quoted(text: &str) -> String {
+    cut(&line(text, usize::MAX), MAX_QUOTED_CHARS)
+}
+
+/// The same of a path: its names may be from outside.
+pub fn quoted_path(path: &Path) -> String {
+    quoted(&path.to_string_lossy())
+}
+
+/// At most so many characters of a text; an ellipsis ends one that is cut.
+fn cut(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => text[..end].to_owned() + "\u{2026}",
+        None => text.to_owned(),
+    }
+}
+
+/// The most characters of a line of a message, and the most lines.
+const MAX_LINE_CHARS: usize = 2000;
+const MAX_LINES: usize = 100;
+
+/// The lines of a message, each of a length that a person can read.
+pub fn short_lines(text: &str) -> Cow<'_, str> {
+    if text.lines().all(|line| line.len() <= MAX_LINE_CHARS) {
+        return text.into();
+    }
+    text.split('\n').map(|line| cut(line, MAX_LINE_CHARS)).collect::<Vec<_>>().join("\n").into()
+}
+
+/// A whole message: printable, and of a length that a person can read.
+pub fn message(text: &str) -> String {
+    let mut shown: Vec<String> =
+        lines(text).split('\n').take(MAX_LINES + 1).map(|line| cut(line, MAX_LINE_CHARS)).collect();
+    if shown.len() > MAX_LINES {
+        shown.truncate(MAX_LINES);
+        shown.push("\u{2026}".to_owned());
+    }
+    shown.join("\n")
+}
 
 /// A text as a line of so many characters at most.
 pub fn line(text: &str, most: usize) -> String {
@@ -30,22 +87,31 @@ fn is_raw(c: char) -> bool {
     is_unprintable(c) && !matches!(c, '\n' | '\t' | '\r')
 }
 
-/// A text of ours as a terminal or a log gets it: its own colours and weights stay, other commands in what it quotes do not.
-pub fn styled(text: &str) -> Cow<'_, str> {
+/// The control sequences that a terminal gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Styles {
+    /// Nothing: the text may quote anything.
+    None,
+    /// Colours and weights, which luxproof set itself: what the text quotes is printable already.
+    Own,
+}
+
+/// A text as a terminal or a log gets it, without commands in what it quotes.
+pub fn inert(text: &str, styles: Styles) -> Cow<'_, str> {
     match without_log_commands(text) {
-        Cow::Borrowed(text) => without_terminal_commands(text),
-        Cow::Owned(text) => without_terminal_commands(&text).into_owned().into(),
+        Cow::Borrowed(text) => without_terminal_commands(text, styles),
+        Cow::Owned(text) => without_terminal_commands(&text, styles).into_owned().into(),
     }
 }
 
-fn without_terminal_commands(text: &str) -> Cow<'_, str> {
+fn without_terminal_commands(text: &str, styles: Styles) -> Cow<'_, str> {
     if text.chars().all(is_plain) {
         return text.into();
     }
     let mut shown = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
-        let length = style(rest).unwrap_or(0);
+        let length = style(rest).filter(|_| styles == Styles::Own).unwrap_or(0);
         let (part, after) = rest.split_at(length.max(c.len_utf8()));
         match c {
             _ if length > 0 || is_plain(c) => shown.push_str(part),
@@ -98,25 +164,98 @@ fn style(text: &str) -> Option<usize> {
     sequence[end..].starts_with('m').then_some(end + 3)
 }
 
-/// JSON whose texts hold nothing that does something: what lies in a file is shown wherever it is looked at.
-pub fn json(text: &str) -> Cow<'_, str> {
-    if !text.contains('\\') && !text.chars().any(is_raw) {
-        return text.into();
+/// Makes the texts of JSON printable: each is one line, except below the keys of longer texts.
+///
+/// Give it a file as a whole, or piece by piece where no piece ends within a text.
+#[derive(Clone, Debug)]
+pub struct JsonTexts {
+    /// The keys of texts that may have several lines.
+    of_lines: &'static [&'static str],
+    /// Whether the last key is one of them.
+    has_lines: bool,
+}
+
+impl JsonTexts {
+    pub const fn new(of_lines: &'static [&'static str]) -> Self {
+        Self { of_lines, has_lines: false }
     }
-    let mut shown = String::with_capacity(text.len());
-    let mut rest = text;
+
+    /// A piece of JSON with printable texts.
+    pub fn printable<'a>(&mut self, json: &'a str) -> Cow<'a, str> {
+        if !json.contains('\\') && !json.chars().any(is_raw) {
+            self.note_last_key(json);
+            return json.into();
+        }
+        let mut shown = String::with_capacity(json.len());
+        let mut rest = json;
+        while let Some(start) = rest.find('"') {
+            let text = &rest[start + 1..];
+            let length = length_of_text(text);
+            let (text, after) = text.split_at(length);
+            push_inert(&rest[..=start], true, &mut shown);
+            if is_key(after) {
+                self.has_lines = self.of_lines.contains(&text);
+                push_inert(text, false, &mut shown);
+            } else {
+                push_inert(text, self.has_lines, &mut shown);
+            }
+            let end = after.len().min(1);
+            shown.push_str(&after[..end]);
+            rest = &after[end..];
+        }
+        push_inert(rest, true, &mut shown);
+        shown.into()
+    }
+
+    /// Remembers the last key of a piece without escapes.
+    fn note_last_key(&mut self, json: &str) {
+        // Every second part between quotes is a text.
+        let mut parts = json.split('"').skip(1);
+        while let (Some(text), Some(after)) = (parts.next(), parts.next()) {
+            if after.trim_start().starts_with(':') {
+                self.has_lines = self.of_lines.contains(&text);
+            }
+        }
+    }
+}
+
+/// JSON of which every text is one printable line.
+pub fn json(text: &str) -> Cow<'_, str> {
+    JsonTexts::new(&[]).printable(text)
+}
+
+/// The bytes up to the quote that ends a text of JSON.
+fn length_of_text(text: &str) -> usize {
+    let mut is_escaped = false;
+    for (at, byte) in text.bytes().enumerate() {
+        if byte == b'"' && !is_escaped {
+            return at;
+        }
+        is_escaped = byte == b'\\' && !is_escaped;
+    }
+    text.len()
+}
+
+/// Whether what follows a text of JSON, its quote first, makes it a key.
+fn is_key(after: &str) -> bool {
+    after.strip_prefix('"').is_some_and(|rest| rest.trim_start().starts_with(':'))
+}
+
+/// Appends a part of JSON with replacements for what must not be printed.
+fn push_inert(part: &str, has_lines: bool, shown: &mut String) {
+    let mut rest = part;
     while let Some(at) = rest.find(|c: char| c == '\\' || is_raw(c)) {
         shown.push_str(&rest[..at]);
         let found = &rest[at..];
         let (escaped, length) = escape(found);
         match escaped {
-            Some(c) if is_raw(c) => shown.push(char::REPLACEMENT_CHARACTER),
+            Some('\n' | '\t' | '\r') if has_lines => shown.push_str(&found[..length]),
+            Some(c) if is_unprintable(c) => shown.push(char::REPLACEMENT_CHARACTER),
             _ => shown.push_str(&found[..length]),
         }
         rest = &found[length..];
     }
     shown.push_str(rest);
-    shown.into()
 }
 
 /// The character that a text begins with, as it is or escaped as in JSON where that says one, and how many bytes say it.
@@ -133,6 +272,9 @@ fn escape(text: &str) -> (Option<char>, usize) {
         }
         Some('b') => (Some('\u{8}'), 2),
         Some('f') => (Some('\u{c}'), 2),
+        Some('n') => (Some('\n'), 2),
+        Some('r') => (Some('\r'), 2),
+        Some('t') => (Some('\t'), 2),
         second => (None, 1 + second.map_or(0, char::len_utf8)),
     }
 }
@@ -213,8 +355,9 @@ mod tests {
             ("\u{1b}]0;x\u{7} \u{1b}[2J \u{1b}[31", "\u{fffd}]0;x\u{fffd} \u{fffd}[2J \u{fffd}[31"),
             ("a\r\nb\rc\u{9b}31m\u{202e}", "a\nb\u{fffd}c\u{fffd}31m\u{fffd}"),
         ] {
-            assert_eq!(styled(text), shown);
+            assert_eq!(inert(text, Styles::Own), shown);
         }
+        assert_eq!(inert("\u{1b}[1;31mred\u{1b}[0m", Styles::None), "\u{fffd}[1;31mred\u{fffd}[0m");
     }
 
     #[test]
@@ -226,14 +369,43 @@ mod tests {
             ("##teamcity[a]", "#\u{fffd}teamcity[a]"),
             ("## luxproof: a::b [c]\n", "## luxproof: a::b [c]\n"),
         ] {
-            assert_eq!(styled(text), shown);
+            assert_eq!(inert(text, Styles::None), shown);
         }
+    }
+
+    #[test]
+    fn a_quoted_text_is_one_line_that_a_person_can_read() {
+        assert_eq!(format!("`{}`", Quoted("a\u{1b}[31mb\r\nc")), "`a\u{fffd}[31mb\u{fffd}\u{fffd}c`");
+        assert_eq!(format!("{:<4}|{:>4}", Quoted("ab"), Quoted("c")), "ab  |   c");
+        let long = quoted(&"x".repeat(100_000));
+        assert_eq!((long.chars().count(), long.ends_with("x\u{2026}")), (201, true));
+        let whole = message(&format!("a\u{1b}[2J\n{}\n{}", "b".repeat(5000), "c\n".repeat(500)));
+        assert!(whole.starts_with("a\u{fffd}[2J\nb") && whole.len() < 2500, "{whole}");
+        assert_eq!(whole.lines().count(), 101);
+    }
+
+    #[test]
+    fn texts_of_json_are_one_line_except_below_the_keys_of_longer_texts() {
+        let mut texts = JsonTexts::new(&["failure"]);
+        assert_eq!(
+            texts.printable(r#"{"title":"a\nb\u000ac\td\"\n","failure":"a\n\tb\u001b","x\n":{"failure" : ["a\nb"]}}"#),
+            "{\"title\":\"a\u{fffd}b\u{fffd}c\u{fffd}d\\\"\u{fffd}\",\"failure\":\"a\\n\\tb\u{fffd}\",\"x\u{fffd}\":{\"failure\" : [\"a\\nb\"]}}"
+        );
+        // The key stands in an earlier piece, with and without escapes in it.
+        for key in ["\"failure\": [\n", "\"a\\n\": 1, \"failure\": [\n"] {
+            texts.printable(key);
+            assert_eq!(texts.printable("\"a\\nb\"\n"), "\"a\\nb\"\n");
+            assert_eq!(texts.printable("], \"title\":\n"), "], \"title\":\n");
+            assert_eq!(texts.printable("\"a\\nb\"\n"), "\"a\u{fffd}b\"\n");
+        }
+        // A value that looks like a key is none.
+        assert_eq!(json(r#"["failure\":", "a\nb"]"#), "[\"failure\\\":\", \"a\u{fffd}b\"]");
     }
 
     #[test]
     fn json_keeps_its_form_and_loses_what_does_something() {
         for (text, shown) in [
-            (r#"{"a":"b\\n\"c\td"}"#, r#"{"a":"b\\n\"c\td"}"#),
+            (r#"{"a":"b\\n\"c\\td"}"#, r#"{"a":"b\\n\"c\\td"}"#),
             (
                 r#"["\u001b]0;\u0007", "\\u001b", "\b\u00e9\ud835\udd4f", "\u"]"#,
                 "[\"\u{fffd}]0;\u{fffd}\", \"\\\\u001b\", \"\u{fffd}\\u00e9\\ud835\\udd4f\", \"\\u\"]",

@@ -8,8 +8,9 @@ use std::path::Path;
 use serde::Deserialize;
 
 use luxproof_model::{Report, Summary};
+use luxproof_process::envelope;
 use luxproof_process::files::{self, FileError};
-use luxproof_process::{envelope, printable};
+use luxproof_process::printable::{JsonTexts, Quoted, quoted};
 
 /// Why a file gives no report.
 #[derive(Debug, thiserror::Error)]
@@ -23,9 +24,9 @@ pub enum ReadError {
 /// Why a text is no report; continues a sentence that starts with the file's name.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    #[error("is no report of luxproof: {0}")]
+    #[error("is no report of luxproof: {}", quoted(&.0.to_string()))]
     Foreign(serde_json::Error),
-    #[error("is damaged or was edited: {0}; run its spec again, finished readings are in the cache")]
+    #[error("is damaged or was edited: {}; run its spec again, finished readings are in the cache", quoted(&.0.to_string()))]
     Damaged(serde_json::Error),
     #[error(
         "was edited, or is by a luxproof that wrote no checksums: its checksum is not that of what it says; run its spec again, finished \
@@ -33,8 +34,8 @@ pub enum ReportError {
     )]
     Edited,
     #[error(
-        "is a report of version {found}, written by luxproof {by}; this luxproof reads version {REPORT_VERSION}: view it with the luxproof \
-         that wrote it, or run its spec again"
+        "is a report of version {found}, written by luxproof {}; this luxproof reads version {REPORT_VERSION}: view it with the luxproof \
+         that wrote it, or run its spec again", Quoted(.by)
     )]
     Version { found: u32, by: String },
 }
@@ -66,7 +67,8 @@ pub fn read(path: &Path) -> Result<Report, ReadError> {
 /// Reads a report; `reopen` gives the same text again, to find out what was wrong with it.
 fn from_text<R: BufRead>(text: R, reopen: impl FnOnce() -> io::Result<R>) -> Result<Report, ReportError> {
     let mut checksum = ContentChecksum::default();
-    let lines = PrintableLines { text, checksum: &mut checksum, line: vec![], read_bytes: 0 };
+    let texts = JsonTexts::new(&KEYS_OF_LINES);
+    let lines = PrintableLines { text, checksum: &mut checksum, texts, line: vec![], read_bytes: 0 };
     // The reader is passed by value: through a reference every byte would cost a call.
     let mut report: Report = match serde_json::from_reader(BufReader::new(lines)) {
         Ok(report) => report,
@@ -107,6 +109,7 @@ fn refusal<R: BufRead>(reopen: impl FnOnce() -> io::Result<R>, source: serde_jso
 struct PrintableLines<'a, R> {
     text: R,
     checksum: &'a mut ContentChecksum,
+    texts: JsonTexts,
     line: Vec<u8>,
     /// Bytes of the line that were read.
     read_bytes: usize,
@@ -120,7 +123,7 @@ impl<R: BufRead> Read for PrintableLines<'_, R> {
             self.text.read_until(b'\n', &mut self.line)?;
             self.checksum.write_all(&self.line)?;
             let line = str::from_utf8(&self.line).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
-            if let Cow::Owned(line) = printable::json(line) {
+            if let Cow::Owned(line) = self.texts.printable(line) {
                 self.line = line.into_bytes();
             }
         }
@@ -129,6 +132,9 @@ impl<R: BufRead> Read for PrintableLines<'_, R> {
         Ok(read)
     }
 }
+
+/// The fields with texts of several lines: messages of programs. Names, titles and all else are one line.
+const KEYS_OF_LINES: [&str; 4] = ["failure", "reason", "notes", "details"];
 
 /// Fields with values that the checksum ignores, so that a repeated run has the same checksum.
 const IGNORED_FIELDS: [&[u8]; 3] = [b"checksum", b"started", b"wall_s"];

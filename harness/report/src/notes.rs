@@ -15,6 +15,7 @@ use luxproof_model::{
     Recording, Split, State, Statistics, Verdict,
 };
 use luxproof_model::{EngineName, ProcedureId, ReadingKey};
+use luxproof_process::printable::Quoted;
 
 /// More meters than this are summarised instead of listed.
 pub(super) const LISTED_METERS: usize = 8;
@@ -273,7 +274,11 @@ fn describe_policy(p: &PolicyRecord) -> String {
 /// Engines that a policy requires and that have no reading.
 pub(super) fn lacking(report: &Report) -> Vec<String> {
     let lacking = report.lacking().into_iter();
-    lacking.map(|(policy, engine)| format!("REQUIRED by {} and without any reading: {engine}", policy.file)).collect()
+    lacking
+        .map(|(policy, engine)| {
+            format!("REQUIRED by {} and without any reading: {}", policy.file, Quoted(engine.as_str()))
+        })
+        .collect()
 }
 
 impl Note<'_> {

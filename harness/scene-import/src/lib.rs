@@ -28,6 +28,7 @@ pub use place::{MeterGrid, Place};
 pub use room_detection::{Group, Part, RoomMesh, Walls};
 pub use summaries::{GroupSummary, ImportSummary, LeftOut, MeshSummary, RoomKind, RoomSummary, UsedMaterial};
 
+use luxproof_process::printable::Quoted;
 use luxproof_spec::{Faults, SpecError, Trust, suggestion};
 use raw::{Kind, Raw, Scene, luminous};
 use room_detection::{Around, around};
@@ -191,7 +192,7 @@ fn reflectance(raw: &Raw<'_>, material: &raw::Material, options: &Options) -> Re
             "give it by --reflectance NAME=0.5, or leave such surfaces out by --leave-out",
         ),
     };
-    let name: String = material.name.chars().take(80).collect();
+    let name = Quoted(&material.name);
     let message = format!("`{name}` is {what}, and {} surfaces are of it{}", material.surfaces, first(raw, material));
     let fault = SpecError { line: material.line, ..SpecError::of(&material.file, message, help) };
     // A library is a file that the scene names: no line of it is shown. The name is the scene's own word.
@@ -266,10 +267,12 @@ fn left_out(raw: &Raw<'_>, chosen: &[Option<f64>]) -> Vec<LeftOut> {
     let of_material = materials.map(|(m, _)| {
         let what = match &m.kind {
             Kind::Light(what) => {
-                format!("surfaces of `{}`, which shines ({what}): luminaires are the spec's own", m.name)
+                format!("surfaces of `{}`, which shines ({what}): luminaires are the spec's own", Quoted(&m.name))
             }
-            Kind::Other(what) => format!("surfaces of `{}`, {what}", m.name),
-            Kind::Unknown | Kind::Diffuse { .. } => format!("surfaces of `{}`, of no known reflectance", m.name),
+            Kind::Other(what) => format!("surfaces of `{}`, {what}", Quoted(&m.name)),
+            Kind::Unknown | Kind::Diffuse { .. } => {
+                format!("surfaces of `{}`, of no known reflectance", Quoted(&m.name))
+            }
         };
         let line = m.line.map(|line| format!("{}:{line}", m.file.display()));
         let first = m.first.map(|line| format!("{}:{line}", raw.scene.path.display()));

@@ -7,6 +7,7 @@ use glam::DVec3;
 use luxproof_scene::geometry::obj::Obj;
 
 use super::raw::{Kind, NO_MATERIAL, Raw, Scene};
+use luxproof_process::printable::{Quoted, quoted_path};
 use luxproof_spec::SpecError;
 
 /// Decimals as they are written.
@@ -98,7 +99,7 @@ impl Libraries {
                     }
                     library(raw, &path, &String::from_utf8_lossy(&bytes), known)?;
                 }
-                Err(error) => raw.note(format!("{} is not read: {error}", path.display())),
+                Err(error) => raw.note(format!("{} is not read: {error}", quoted_path(&path))),
             }
         }
         Ok(())
@@ -124,7 +125,7 @@ fn library(raw: &mut Raw<'_>, path: &Path, text: &str, known: &mut HashMap<Strin
     for (name, entry) in entries {
         let line = Some(entry.line);
         let kind = entry.kind().map_err(|why| {
-            let fault = SpecError::of(path, format!("material `{name}`: {why}"), "correct it");
+            let fault = SpecError::of(path, format!("material `{}`: {why}", Quoted(&name)), "correct it");
             SpecError { line, ..fault }.withheld(trust)
         })?;
         let place = raw.material(&name, kind, path, line);
@@ -134,7 +135,7 @@ fn library(raw: &mut Raw<'_>, path: &Path, text: &str, known: &mut HashMap<Strin
     if glossy > 0 {
         raw.note(format!(
             "gloss (Ks) of {glossy} materials of {} is left out: every surface is diffuse",
-            path.display()
+            quoted_path(path)
         ));
     }
     Ok(())

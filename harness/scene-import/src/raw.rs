@@ -7,6 +7,7 @@ use glam::DVec3;
 use luxproof_scene::geometry::polygon::Triangulator;
 
 use crate::luminaires::RawLight;
+use luxproof_process::printable;
 use luxproof_spec::{SpecError, Trust};
 
 /// A scene of more triangles is imported in parts.
@@ -144,7 +145,7 @@ impl<'a> Raw<'a> {
 
     /// Adds a material and gives its place.
     pub(super) fn material(&mut self, name: &str, kind: Kind, file: &Path, line: Option<usize>) -> u32 {
-        let (name, file) = (name.to_owned(), file.to_owned());
+        let (name, file) = (printable::line(name, usize::MAX), file.to_owned());
         self.materials.push(Material { name, kind, file, line, surfaces: 0, first: None });
         (self.materials.len() - 1) as u32
     }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use glam::DVec3;
+use luxproof_process::printable::Quoted;
 use serde::Serialize;
 
 use crate::luminaires::LuminaireSummary;
@@ -121,7 +122,14 @@ impl fmt::Display for ImportSummary {
                 Some([r, g, b]) if g != r || b != r => format!("  of {r} {g} {b}"),
                 _ => String::new(),
             };
-            writeln!(f, "  {:width$} {:>9} {:>10.4} {:>11}{from}", m.name, m.triangles, m.area_m2, m.reflectance)?;
+            writeln!(
+                f,
+                "  {:width$} {:>9} {:>10.4} {:>11}{from}",
+                Quoted(&m.name),
+                m.triangles,
+                m.area_m2,
+                m.reflectance
+            )?;
         }
         more(f, self.materials.len())?;
         writeln!(f, "bounding box: {} to {} m in the scene", box_of(self.min_m), box_of(self.max_m))?;
@@ -155,6 +163,7 @@ impl fmt::Display for RoomSummary {
                 writeln!(f, "room: {file} in {size} m, the scene's outermost surfaces, which close; no box: {no_box}")?;
                 for g in self.groups.iter().take(MAX_LINES) {
                     let GroupSummary { name, reflectance, triangles } = g;
+                    let name = Quoted(name);
                     writeln!(f, "  group {name}, reflectance {reflectance}, {triangles} triangles")?;
                 }
                 more(f, self.groups.len())

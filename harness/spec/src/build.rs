@@ -42,7 +42,7 @@ const MAX_METERS: usize = 1_000_000;
 const IF_YOURS: &str = "run it without --untrusted if it is yours, or with --trusted if your bundle holds it";
 
 /// The longest name, and the longest title, in characters.
-const MAX_NAME: usize = 100;
+pub(super) const MAX_NAME: usize = 100;
 const MAX_TITLE: usize = 1000;
 
 /// A spec, read, checked and built: all that the rest of the program needs.

@@ -7,11 +7,13 @@ use std::collections::HashSet;
 
 use serde_yaml::{Mapping, Value};
 
+use super::build::MAX_NAME;
 use super::compare::{Pair, pairs};
 use super::model::{EngineSettings, Spec};
 use super::shape::{self, Mended, Shaped, Trials};
 use super::tree::Tree;
 use super::{Source, SpecError};
+use luxproof_process::printable::Quoted;
 
 /// One case of a spec: its text with overrides laid over it.
 #[derive(Clone, Debug)]
@@ -179,9 +181,12 @@ fn is_name_character(c: char) -> bool {
 
 /// Checks a case's name, since it becomes a folder's name.
 fn check_name(source: &Source, place: &str, name: &str) -> Result<(), SpecError> {
-    let sound = !name.is_empty() && !name.starts_with('.') && name.chars().all(is_name_character);
-    let help = "use letters, digits, hyphens, underscores and points; put a name of digits alone in quotes";
-    source.require(sound, place, format!("`{name}` is no name of a case"), help)
+    let is_short = (1..=MAX_NAME).contains(&name.len());
+    let is_name = is_short && !name.starts_with('.') && name.chars().all(is_name_character);
+    let help = format!(
+        "use at most {MAX_NAME} letters, digits, hyphens, underscores and points; put a name of digits alone in quotes"
+    );
+    source.require(is_name, place, format!("`{}` is no name of a case", Quoted(name)), help)
 }
 
 /// Lays overrides over a spec; `None` where the faults leave no case to build.

@@ -45,7 +45,7 @@ pub use write::yaml;
 
 /// What is wrong with a spec, where, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}{message}{}", place(.file, *.line, *.column), help.as_ref().map(|h| format!("; {h}")).unwrap_or_default())]
+#[error("{}", describe(self))]
 pub struct SpecError {
     /// The file that holds the error: the spec or a file that it names.
     pub file: PathBuf,
@@ -77,9 +77,11 @@ impl SpecError {
     }
 }
 
-fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
-    let [line, column] = [line, column].map(|number| number.map(|n| format!("{n}:")).unwrap_or_default());
-    format!("{}:{line}{column} ", file.display())
+/// An error in one printable line, whatever it quotes.
+fn describe(error: &SpecError) -> String {
+    let [line, column] = [error.line, error.column].map(|number| number.map(|n| format!("{n}:")).unwrap_or_default());
+    let help = error.help.as_ref().map(|help| format!("; {help}")).unwrap_or_default();
+    printable::line(&format!("{}:{line}{column} {}{help}", error.file.display(), error.message), usize::MAX)
 }
 
 /// Whether a line of YAML has nothing but blanks or a comment.

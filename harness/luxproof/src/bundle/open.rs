@@ -23,6 +23,7 @@ use luxproof_model::REPORT_FILE;
 use luxproof_model::Report;
 use luxproof_process::digest;
 use luxproof_process::files::{self, Durability, FileError, MAX_KEPT_BYTES, read_bounded};
+use luxproof_process::foreign_json;
 use luxproof_process::printable;
 use luxproof_spec::{BUNDLE_FILE, Trust};
 
@@ -106,7 +107,7 @@ impl Opened {
             return Err(broken(faults));
         }
         let lock = read_bounded(&stage.path().join(LOCK), MAX_TEXT).map_err(|e| FileError::of(&path.join(LOCK), e))?;
-        let lock: Lock = serde_json::from_slice(&lock).map_err(|source| BundleError::Json {
+        let lock: Lock = foreign_json::from_slice(&lock).map_err(|source| BundleError::Json {
             bundle: shown.clone(),
             file: LOCK.to_owned(),
             source,
@@ -304,7 +305,7 @@ fn differences(listed: &Sums, found: &Sums, stage: &Path) -> Vec<String> {
 /// The hashes that the bundle's description gives.
 fn described(stage: &Path) -> Option<Sums> {
     let bytes = read_bounded(&stage.join(BUNDLE_FILE), MAX_TEXT).ok()?;
-    let read: Description = serde_json::from_slice(&bytes).ok()?;
+    let read: Description = foreign_json::from_slice(&bytes).ok()?;
     Some(read.graph.into_iter().filter_map(|entity| Some((entity.name?, entity.sha256?))).collect())
 }
 

@@ -17,6 +17,7 @@ use luxproof_model::EngineName;
 use luxproof_model::Exit;
 use luxproof_model::PolicyRecord;
 use luxproof_model::numbers::plural;
+use luxproof_process::printable::Quoted;
 use luxproof_report::words::rounded;
 use luxproof_spec::{Budget, Trust, find_lints};
 
@@ -74,7 +75,8 @@ pub(super) fn check(selected: &Selected, site: &EngineRoot, trust: Trust) -> Res
     for (policy, engines) in planned {
         writeln!(out, "policy {}", policy.file).into_diagnostic()?;
         for engine in policy.required_engines.iter().filter(|engine| !engines.contains(*engine)) {
-            writeln!(out, "REQUIRED by {} and not to run: {engine}", policy.file).into_diagnostic()?;
+            writeln!(out, "REQUIRED by {} and not to run: {}", policy.file, Quoted(engine.as_str()))
+                .into_diagnostic()?;
             exit = Exit::Engine;
         }
     }

@@ -22,6 +22,7 @@ use luxproof_engines::EngineRoot;
 use luxproof_model::ProcedureId;
 use luxproof_model::Sampling;
 use luxproof_model::{Exit, Report};
+use luxproof_process::printable::{Quoted, quoted};
 use luxproof_process::process;
 use luxproof_report::words;
 use luxproof_spec::{Case, Trust};
@@ -226,12 +227,12 @@ fn reproduction_text(reproduction: &Reproduction) -> String {
     let comparisons: usize = reproduction.rows.iter().map(|row| row.comparisons).sum();
     let mut text = format!(
         "{}: {verdict}. Of {rows} procedures of engines ({comparisons} comparisons) {}\n",
-        reproduction.title,
+        Quoted(&reproduction.title),
         parts.join(", ")
     );
     let (then, now) = (&reproduction.tool_then, &reproduction.tool_now);
     if then != now {
-        text += &format!("  luxproof {then} then, {now} now\n");
+        text += &format!("  luxproof {} then, {now} now\n", Quoted(&then.to_string()));
     }
     reproduction.engines.iter().filter(|engine| !engine.is_the_same).for_each(|engine| text += &engine_text(engine));
     for row in reproduction.rows.iter().filter(|row| row.outcome != Outcome::SameBytes) {
@@ -243,11 +244,14 @@ fn reproduction_text(reproduction: &Reproduction) -> String {
 /// A line on an engine that is not what it was.
 fn engine_text(engine: &EngineThen) -> String {
     let EngineThen { id, version_then, version_now, reason, .. } = engine;
-    let then = version_then.as_deref().unwrap_or("no version");
+    let id = Quoted(id.as_str());
+    let then = Quoted(version_then.as_deref().unwrap_or("no version"));
     match version_now {
-        Some(now) if now == then => format!("  {id}: {then} as then, of other bytes (its fingerprint differs)\n"),
+        Some(now) if now == then.0 => format!("  {id}: {then} as then, of other bytes (its fingerprint differs)\n"),
         Some(now) => format!("  {id}: {then} then, {now} now\n"),
-        None => format!("  {id}: {then} then, absent now ({})\n", reason.as_deref().unwrap_or("no reason given")),
+        None => {
+            format!("  {id}: {then} then, absent now ({})\n", Quoted(reason.as_deref().unwrap_or("no reason given")))
+        }
     }
 }
 
@@ -262,7 +266,7 @@ fn row_text(row: &Row) -> String {
         Outcome::Differs => "DIFFERS",
         Outcome::NotRead => "NOT READ",
     };
-    let notes = row.notes.iter().fold(String::new(), |notes, note| notes + "; " + note);
+    let notes = row.notes.iter().fold(String::new(), |notes, note| notes + "; " + &quoted(note));
     let mut text = format!("  {}: {outcome}{notes}\n", row.key);
     for Difference { meter, against, then, now, unit, verdict_then, verdict_now } in
         row.differences.iter().take(MAX_DIFFERENCES)

@@ -9,7 +9,7 @@ use terminal_size::terminal_size_of;
 
 use super::last_run::named_or_last;
 use super::{Audited, Choice, Extent, Selected};
-use luxproof_console::{json, print};
+use luxproof_console::{json, print, print_styled};
 use luxproof_model::{Exit, Report};
 use luxproof_process::files;
 use luxproof_report::{AttachedReport, Detail, Letters, Screen, Style};
@@ -109,7 +109,8 @@ pub(super) fn print_report(report: &Report, folder: &Path, views: &Views) -> Res
             Format::Csv => luxproof_report::csv(report),
             Format::Html => page(report, folder, &beside),
         };
-        print(&format!("{}\n", text.trim_end()))?;
+        let text = format!("{}\n", text.trim_end());
+        if *format == Format::Terminal && style == Style::Colour { print_styled(&text)? } else { print(&text)? }
     }
     Ok(())
 }

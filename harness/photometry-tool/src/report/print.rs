@@ -5,6 +5,7 @@ use std::fmt;
 use super::super::figures::{
     BeamRecord, Bug, Figure, Figures, Luminances, SpacingRecord, Ugr, Widths, ZonalLumens, Zone,
 };
+use luxproof_process::printable::quoted;
 use luxproof_report::words::trimmed;
 
 impl fmt::Display for Figures {
@@ -12,7 +13,7 @@ impl fmt::Display for Figures {
         writeln!(f, "{}", self.file)?;
         write_row(f, "format", &self.format)?;
         if let Some(luminaire) = &self.luminaire {
-            write_row(f, "luminaire", luminaire.lines().next().unwrap_or_default())?;
+            write_row(f, "luminaire", &quoted(luminaire.lines().next().unwrap_or_default()))?;
         }
         write_row(f, "flux", &format!("{:.1} lm", self.flux_lm))?;
         write_row(f, "beam axis", &self.beam.describe(describe_axis))?;

@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::document::{Accessor, Document};
 use crate::raw::{MAX_TRIANGLES, Scene};
+use luxproof_process::printable::{Quoted, quoted_path};
 use luxproof_spec::SpecError;
 
 const BROKEN: &str = "the file is broken: export it again";
@@ -212,13 +213,10 @@ pub(super) fn uri_bytes(scene: &Scene<'_>, uri: &str) -> Result<Vec<u8>, (String
         return STANDARD.decode(encoded).map_err(|e| (format!("its data URI: {e}"), BROKEN));
     }
     if uri.contains("://") {
-        return Err((
-            format!("{} is on a network", uri.chars().take(80).collect::<String>()),
-            "fetch it, and name the file",
-        ));
+        return Err((format!("{} is on a network", Quoted(uri)), "fetch it, and name the file"));
     }
     let path = scene.path_of(&unescaped(uri));
-    scene.read(&path).map_err(|e| (format!("{} cannot be read: {e}", path.display()), "give it beside the .gltf"))
+    scene.read(&path).map_err(|e| (format!("{} cannot be read: {e}", quoted_path(&path)), "give it beside the .gltf"))
 }
 
 /// A relative URI as a file's name: `%20` is a blank.

@@ -10,6 +10,8 @@ use std::collections::BTreeSet;
 use glam::{DMat4, DQuat, DVec3};
 
 use super::raw::{Kind, NO_MATERIAL, Raw, Scene};
+use luxproof_process::foreign_json;
+use luxproof_process::printable::{Quoted, quoted};
 use luxproof_spec::SpecError;
 
 use buffers::Buffers;
@@ -42,10 +44,10 @@ pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
     let bytes = scene.bytes()?;
     let (json, binary) = buffers::chunks(scene, &bytes)?;
     let document: Document =
-        serde_json::from_slice(json).map_err(|error| no_document(scene, &error, binary.is_some()))?;
+        foreign_json::from_slice(json).map_err(|error| no_document(scene, &error, binary.is_some()))?;
     if !document.asset.version.starts_with("2.") {
-        let version: String = document.asset.version.chars().take(20).collect();
-        return Err(scene.fault(None, format!("asset.version is `{version}`"), "export it as glTF 2.0"));
+        let message = format!("asset.version is `{}`", Quoted(&document.asset.version));
+        return Err(scene.fault(None, message, "export it as glTF 2.0"));
     }
     let mut raw = Raw::new(scene, PRECISION);
     extensions(&mut raw, &document)?;
@@ -69,7 +71,7 @@ fn no_document(scene: &Scene<'_>, error: &serde_json::Error, is_binary: bool) ->
     let message = message.split(" at line ").next().unwrap_or(&message);
     // In a GLB a line of its JSON is no line of the file.
     let [line, column] = [error.line(), error.column()].map(|n| Some(n).filter(|n| *n > 0 && !is_binary));
-    let fault = scene.fault(line, format!("this is no glTF: {message}"), "export it again as glTF 2.0");
+    let fault = scene.fault(line, format!("this is no glTF: {}", Quoted(message)), "export it again as glTF 2.0");
     SpecError { column, ..fault }
 }
 
@@ -79,11 +81,10 @@ fn extensions(raw: &mut Raw<'_>, document: &Document) -> Result<(), SpecError> {
     let refused = required.iter().find(|name| !KNOWN.contains(&name.as_str()));
     let used = document.extensions_used.0.iter().filter(|name| REFUSED.contains(&name.as_str()));
     if let Some(name) = refused.or_else(|| used.clone().next()) {
-        let name: String = name.chars().take(80).collect();
-        return Err(raw.scene.fault(None, format!("it uses the extension {name}"), UNPACK));
+        return Err(raw.scene.fault(None, format!("it uses the extension {}", Quoted(name)), UNPACK));
     }
     let others = document.extensions_used.0.iter().filter(|name| !KNOWN.contains(&name.as_str()));
-    let others: Vec<String> = others.take(20).map(|name| name.chars().take(80).collect()).collect();
+    let others: Vec<String> = others.take(20).map(|name| quoted(name)).collect();
     if !others.is_empty() {
         raw.note(format!("passed over: {}", others.join(", ")));
     }
@@ -243,7 +244,7 @@ impl Reader<'_, '_> {
             None => (0..points.len() as u32).collect(),
         };
         if let Some(name) = of.attributes.others.keys().find(|name| name.starts_with("COLOR_")) {
-            self.raw.note(format!("passed over: {}", name.chars().take(40).collect::<String>()));
+            self.raw.note(format!("passed over: {}", Quoted(name)));
         }
         let raw = &mut self.raw;
         let material = of.material.map(|k| (k, self.materials.get(k)));

@@ -12,6 +12,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::raw::{Kind, Raw, Scene};
+use luxproof_process::printable::Quoted;
 use luxproof_spec::{SpecError, suggestion};
 
 use words::{Command, Next, Words};
@@ -122,7 +123,11 @@ impl Reader<'_> {
             return Ok(());
         }
         if let Some((_, what)) = ELSEWHERE.iter().find(|(word, _)| *word == kind) {
-            return Err(self.raw.scene.fault(Some(line), format!("`{name}` is {kind}"), format!("it is {what}")));
+            return Err(self.raw.scene.fault(
+                Some(line),
+                format!("`{}` is {kind}", Quoted(name)),
+                format!("it is {what}"),
+            ));
         }
         let made = if LIGHTS.contains(&kind) {
             Kind::Light(kind.to_owned())
@@ -134,7 +139,7 @@ impl Reader<'_> {
             Kind::Other(kind.to_owned())
         } else {
             let known = SURFACES.iter().chain(&MATERIALS).chain(&PATTERNS).chain(&LIGHTS).copied();
-            let message = format!("`{kind}` is no type of Radiance's");
+            let message = format!("`{}` is no type of Radiance's", Quoted(kind));
             return Err(self.raw.scene.fault(Some(line), message, suggestion(kind, known)));
         };
         self.define(name, made, line);
@@ -152,7 +157,7 @@ impl Reader<'_> {
         match (modifier, kind) {
             ("void", kind) => Ok(kind),
             (_, Kind::Diffuse { .. }) if self.named.contains_key(modifier) => {
-                Ok(Kind::Other(format!("plastic with `{modifier}` on it")))
+                Ok(Kind::Other(format!("plastic with `{}` on it", Quoted(modifier))))
             }
             (_, kind) if self.named.contains_key(modifier) => Ok(kind),
             _ => Err(self.undefined(modifier, line)),
@@ -161,7 +166,7 @@ impl Reader<'_> {
 
     fn undefined(&self, name: &str, line: usize) -> SpecError {
         let help = "define it before it is used: give its file before this one, as `cat materials.rad scene.rad` does";
-        self.raw.scene.fault(Some(line), format!("`{name}` is not defined"), help)
+        self.raw.scene.fault(Some(line), format!("`{}` is not defined", Quoted(name)), help)
     }
 
     fn surface(&mut self, kind: &str, modifier: &str, line: usize, numbers: &[f64]) -> Result<(), SpecError> {
@@ -189,7 +194,7 @@ impl Reader<'_> {
 
     /// The error for a command that is not run.
     fn refused(&self, command: &Command<'_>) -> SpecError {
-        let head: String = command.text.trim().chars().take(60).collect();
+        let head = Quoted(command.text.trim());
         let help = "run `xform -e scene.rad > flat.rad` where the scene comes from, which writes what its commands draw, and \
                     import flat.rad";
         let message = format!("`!{head}` is a command, and commands of a scene are not run");

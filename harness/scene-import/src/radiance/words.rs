@@ -1,6 +1,7 @@
 //! The words of a Radiance scene, each with its line.
 
 use crate::raw::Scene;
+use luxproof_process::printable::Quoted;
 use luxproof_spec::SpecError;
 
 pub(super) struct Words<'a> {
@@ -103,7 +104,7 @@ impl<'a> Words<'a> {
     }
 
     fn no(&self, what: &str, word: &str) -> SpecError {
-        let word: String = word.chars().take(40).collect();
+        let word = Quoted(word);
         let help = "a primitive is `modifier type name`, then how many strings, integers and numbers follow, each list with its count";
         self.scene.fault(Some(self.line), format!("`{word}` is not {what}"), help)
     }

@@ -28,7 +28,8 @@ use luxproof_engines::EngineRoot;
 use luxproof_model::Exit;
 use luxproof_model::{EngineName, EngineStatus, Status};
 use luxproof_process::files::{FileError, MAX_KEPT_BYTES};
-use luxproof_process::{files, process};
+use luxproof_process::printable::quoted;
+use luxproof_process::{files, foreign_json, process};
 use luxproof_spec::Resolve;
 use luxproof_spec::Trust;
 use luxproof_verdict::PolicyChoice;
@@ -242,9 +243,10 @@ impl Workload {
         let shown = path.display();
         let most = if trust == Trust::Own { MAX_KEPT_BYTES } else { MAX_FOREIGN_BYTES };
         let bytes = files::read_bounded(path, most).map_err(|source| FileError::of(path, source)).into_diagnostic()?;
-        let plan: Self = serde_json::from_slice(&bytes)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("{shown} is no plan of `luxproof plan --json`"))?;
+        let plan: Self = foreign_json::from_slice(&bytes).map_err(|error| {
+            let why = quoted(&error.to_string());
+            miette!(help = "give what `luxproof plan --json` prints", "{shown} is no plan: {why}")
+        })?;
         if plan.luxproof != FORM {
             return Err(miette!(help = "plan again with this program", "{shown} is of version {}", plan.luxproof));
         }
