@@ -19,6 +19,8 @@ mod contact;
 mod cylindrical;
 mod external_adapter;
 mod faults;
+mod foreign_cards;
+mod foreign_text;
 mod furnished_office;
 mod glare;
 mod guide;

@@ -644,6 +644,38 @@ fn tables_and_libraries_that_are_no_specs_are_followed_nowhere_and_not_quoted() 
 }
 
 #[test]
+fn a_profile_that_a_scene_names_is_not_quoted() {
+    let folder = Folder::new(&[]);
+    let scene = json!({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}],
+        "nodes": [{"mesh": 0, "scale": [4, 3, 1]}, {"mesh": 0, "scale": [4, 3, 1], "translation": [0, 0, 5]},
+                  {"translation": [2, 1, 2], "extensions": {"EXT_lights_ies": {"light": 0}}}],
+        "extensions": {"EXT_lights_ies": {"lights": [{"uri": "profile.ies"}]}},
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
+    });
+    folder.write("s.gltf", &scene.to_string());
+    for profile in [
+        format!("TOKEN={SECRET}\n"),
+        format!("IESNA:LM-63-2002\nTILT=NONE\n1 {SECRET} 1 3 1\n"),
+        format!("IESNA:LM-63-2002\nTILT={SECRET}\n1 1 1 3 1\n"),
+    ] {
+        folder.write("profile.ies", &profile);
+        let import = |trust: &[&str]| {
+            let import = ["import", "s.gltf", "--reflectance", "default=0.5", "--out", "made", "--force"];
+            folder.luxproof(&[&import[..], trust].concat())
+        };
+        let answer = import(&["--untrusted"]).exits(2);
+        tells_no_secret(&answer);
+        assert!(answer.stderr.contains("profile") || answer.stderr.contains("luminaire-0.ies"), "{answer:?}");
+        // Of the user's own a message quotes the line.
+        assert_eq!(import(&[]).stderr.contains(SECRET), !profile.starts_with("TOKEN"));
+    }
+}
+
+#[test]
 fn files_of_an_archive_of_photometry_are_not_listed() {
     let product = format!(
         "<Root><GeneralDefinitions><Files><File id='a' type='localFileName'>{SECRET}.ies</File><File id='b' \

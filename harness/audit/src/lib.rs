@@ -179,7 +179,7 @@ impl Options<'_> {
     /// The options that readings and verdicts depend on, as the report stores them.
     pub fn request(&self) -> Request {
         let Selection { engines, procedures, seed } = self.selection.clone();
-        let PolicyChoice { file, profile, tolerance_class } = self.policy.clone();
+        let PolicyChoice { file, profile, tolerance_class, .. } = self.policy.clone();
         Request {
             engines,
             procedures,
@@ -205,7 +205,7 @@ impl Options<'_> {
             selection: Selection { engines, procedures, seed },
             filter,
             skipping: if request.no_skips { Skipping::Nothing } else { Skipping::Allowed },
-            policy: PolicyChoice { file: self.policy.file.clone(), profile, tolerance_class },
+            policy: PolicyChoice { profile, tolerance_class, ..self.policy },
             sampling: request.sampling,
             budget: ProfileBudget { relative_error: request.relative_error, seconds: None },
             calibration: if request.no_calibration { Calibration::LeftOut } else { Calibration::Judged },

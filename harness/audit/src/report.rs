@@ -2,11 +2,12 @@
 
 use glam::DVec3;
 use luxproof_process::clock::timestamp;
+use std::collections::HashMap;
 use std::time::SystemTime;
 
 use luxproof_model::{
-    CaseRecord, Comparison, FloorPlan, MAX_DRAWN, PlanLuminaire, REPORT_VERSION, ReadingRecord, Recording, Report,
-    Skip, SpecRecord, Summary, Verdict,
+    CaseRecord, Comparison, FloorPlan, MAX_DRAWN, PlanLuminaire, REPORT_VERSION, ReadingKey, ReadingRecord, Recording,
+    Report, Skip, SpecRecord, Summary, Verdict,
 };
 use luxproof_scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, flush};
 use luxproof_spec::Case;
@@ -93,13 +94,12 @@ fn bounding_rectangle(body: &Obstacle) -> [[f64; 2]; 2] {
 
 /// Explains failures without a diagnosis by the errors that their engines declare.
 pub(crate) fn explain_by_declared_errors(report: &mut Report) {
-    for k in 0..report.comparisons.len() {
-        let comparison = &report.comparisons[k];
-        if comparison.verdict != Verdict::Fail || comparison.diagnosis.is_some() {
-            continue;
+    let recordings: HashMap<&ReadingKey, &Recording> = report.recordings.iter().map(|r| (&r.key, r)).collect();
+    for comparison in &mut report.comparisons {
+        if comparison.verdict == Verdict::Fail && comparison.diagnosis.is_none() {
+            let declared = recordings.get(&comparison.key).and_then(|recording| recording.declared(comparison));
+            comparison.diagnosis = declared.map(|why| format!("as it declares: {why}"));
         }
-        let declared = report.declared(comparison).map(|why| format!("as it declares: {why}"));
-        report.comparisons[k].diagnosis = declared;
     }
 }
 

@@ -1,6 +1,6 @@
 //! Capabilities: what a renderer is asked for, and which cases show it. They are data: `reference/capabilities.yaml`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -116,9 +116,26 @@ impl Capabilities {
         Self::parse(&Source::new(PathBuf::from(EXAMPLE_FILE), BUILT_IN.to_owned()))
     }
 
-    /// Reads a file of the user's own.
-    pub fn read(path: &Path) -> Result<Self, SpecError> {
-        Self::parse(&Source::read(path, Trust::Own)?)
+    /// Reads a file.
+    pub fn read(path: &Path, trust: Trust) -> Result<Self, SpecError> {
+        Self::parse(&Source::read(path, trust)?)
+    }
+
+    /// The capabilities that each procedure of a case shows, each once.
+    pub(crate) fn by_procedure(&self) -> HashMap<(&str, ProcedureId), Vec<&Capability>> {
+        let mut shown: HashMap<(&str, ProcedureId), Vec<&Capability>> = HashMap::new();
+        for capability in &self.capabilities {
+            for selector in &capability.cases {
+                for procedure in &selector.procedures {
+                    let all = shown.entry((&selector.case, *procedure)).or_default();
+                    // Those of one capability come one after the other.
+                    if all.last().is_none_or(|last| last.id != capability.id) {
+                        all.push(capability);
+                    }
+                }
+            }
+        }
+        shown
     }
 
     fn parse(source: &Source) -> Result<Self, SpecError> {

@@ -1,6 +1,6 @@
 //! The cards: renderers by releases by capabilities, collected from runs. What `cards.json` holds.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use itertools::Itertools;
 use luxproof_model::{EngineName, HiddenVariant, ProcedureId, Report, Request, Role, Status, ToleranceClass, Tool};
@@ -147,6 +147,13 @@ pub enum Verification {
         /// SHA-256 of the bundle's list of hashes.
         bundle_sha256: String,
     },
+    /// It came in a bundle, which was not run again here.
+    Submitted {
+        /// SHA-256 of the bundle's list of hashes.
+        bundle_sha256: String,
+    },
+    /// It is a report of somebody else, which nothing supports.
+    Unverified,
 }
 
 impl CardRun {
@@ -216,13 +223,12 @@ impl Cards {
         let mut own = BTreeSet::new();
         for (run, report) in runs.iter().sorted_by(|(a, _), (b, _)| a.started.cmp(&b.started)) {
             check(report, run)?;
-            let index = ReportIndex::new(report);
+            let index = ReportIndex::new(report, capabilities);
             let mut has_case = false;
             for status in report.engines.iter().filter(|status| status.status != Status::Absent) {
                 let label = ReleaseLabel::of(status);
-                let evidence =
-                    capabilities.capabilities.iter().map(|c| (&c.id, index.evidence(c, &status.id, &run.id)));
-                let evidence: Vec<_> = evidence.filter(|(_, cases)| !cases.is_empty()).collect();
+                let mut evidence = index.evidence(&status.id, &run.id);
+                evidence.retain(|_, cases| !cases.is_empty());
                 if evidence.is_empty() {
                     continue;
                 }
@@ -285,7 +291,7 @@ fn check(report: &Report, run: &CardRun) -> Result<(), CardsError> {
 }
 
 impl Release {
-    fn add(&mut self, evidence: Vec<(&CapabilityId, Vec<CaseEvidence>)>, run: &RunId, engine: &EngineName) {
+    fn add(&mut self, evidence: BTreeMap<&CapabilityId, Vec<CaseEvidence>>, run: &RunId, engine: &EngineName) {
         self.runs.insert(run.clone());
         for (capability, cases) in evidence {
             let known = self.evidence.entry(capability.clone()).or_default();
@@ -313,6 +319,8 @@ fn renderer_card(
     let folder = slug(&name);
     let mut cards: Vec<ReleaseCard> = vec![];
     let mut evidence: BTreeMap<CapabilityId, Vec<ReleaseEvidence>> = BTreeMap::new();
+    // By capability the last release in which it was tested, with its cell. What was not tested has not changed.
+    let mut tested: HashMap<CapabilityId, (ReleaseLabel, CellCard)> = HashMap::new();
     // The oldest first, so that each is compared with the one before.
     for (label, mut release) in releases {
         let mut cells = vec![];
@@ -321,12 +329,15 @@ fn renderer_card(
                 release.evidence.remove(&capability.id).map(|cases| cases.into_values().collect()).unwrap_or_default();
             inherit_limits(&mut cases);
             let cell = judge(capability, &cases);
-            let before = tested_before(&cards, &capability.id);
+            let before = tested.get(&capability.id).map(|(_, cell)| cell);
             cells.push(cell_card(&folder, &label, capability.id.clone(), cell.clone(), before));
             let of_release = ReleaseEvidence { release: label.clone(), is_recorded: release.is_recorded, cell, cases };
             evidence.entry(capability.id.clone()).or_default().push(of_release);
         }
-        let changes = changes(&cards, &cells);
+        let changes = changes(&tested, &cells);
+        for cell in cells.iter().filter(|cell| !cell.cell.standing.is_untested()) {
+            tested.insert(cell.capability.clone(), (label.clone(), cell.clone()));
+        }
         let Release { versions, is_recorded, runs, .. } = release;
         cards.push(ReleaseCard { release: label, versions, is_recorded, runs, cells, changes });
     }
@@ -343,11 +354,11 @@ fn cell_card(
     label: &ReleaseLabel,
     capability: CapabilityId,
     cell: Cell,
-    before: Option<(&ReleaseCard, &CellCard)>,
+    before: Option<&CellCard>,
 ) -> CellCard {
     let since = match before {
         None => None,
-        Some((_, earlier)) if earlier.cell.standing.key() == cell.standing.key() => earlier.since.clone(),
+        Some(earlier) if earlier.cell.standing.key() == cell.standing.key() => earlier.since.clone(),
         Some(_) => Some(label.clone()).filter(|_| !cell.standing.is_untested()),
     };
     let page = format!("renderers/{folder}/{capability}.html#{}", anchor(label));
@@ -370,20 +381,15 @@ impl ReleaseCard {
 /// A bound that grows or shrinks by more than this factor may be a change.
 const CHANGED_BOUND: f64 = 2.0;
 
-/// The last release in which a capability was tested, with its cell. What was not tested has not changed.
-fn tested_before<'a>(earlier: &'a [ReleaseCard], capability: &CapabilityId) -> Option<(&'a ReleaseCard, &'a CellCard)> {
-    let cells = earlier.iter().rev().filter_map(|release| Some((release, release.cell(capability)?)));
-    cells.into_iter().find(|(_, cell)| !cell.cell.standing.is_untested())
-}
-
-fn changes(earlier: &[ReleaseCard], cells: &[CellCard]) -> Vec<Change> {
+/// What differs from the last release in which it was tested.
+fn changes(tested: &HashMap<CapabilityId, (ReleaseLabel, CellCard)>, cells: &[CellCard]) -> Vec<Change> {
     let mut found = vec![];
     for cell in cells.iter().filter(|cell| !cell.cell.standing.is_untested()) {
-        let Some((release, before)) = tested_before(earlier, &cell.capability) else { continue };
+        let Some((release, before)) = tested.get(&cell.capability) else { continue };
         if has_changed(&before.cell, &cell.cell) {
             found.push(Change {
                 capability: cell.capability.clone(),
-                before: release.release.clone(),
+                before: release.clone(),
                 from: before.headline.clone(),
                 to: cell.headline.clone(),
             });

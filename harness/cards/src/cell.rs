@@ -186,15 +186,14 @@ pub(crate) fn inherit_limits(evidence: &mut [CaseEvidence]) {
         let named = e.limits().into_iter().filter(|limit| !limit.text.is_empty());
         named.map(|limit| (e.case.clone(), e.procedure, limit.text.clone(), limit.bound()))
     });
-    let limits: Vec<_> = limits.collect();
+    let limits = limits.into_group_map_by(|(case, procedure, ..)| (case.clone(), *procedure));
     for variant in evidence.iter_mut().filter(|e| e.hidden.is_some()) {
         let (case, procedure) = (variant.case.clone(), variant.procedure);
         let Outcome::Measured(measurement) = &mut variant.outcome else { continue };
         for remark in &mut measurement.remarks {
             let Remark::Fault { points, worst: Some(worst), at, .. } = remark else { continue };
-            let known = limits.iter().find(|(of, what, _, bound)| {
-                *of == case && *what == procedure && worst.bound() <= SAME_CAUSE_FACTOR * bound
-            });
+            let mut known = limits.get(&(case.clone(), procedure)).into_iter().flatten();
+            let known = known.find(|(_, _, _, bound)| worst.bound() <= SAME_CAUSE_FACTOR * bound);
             if let Some((_, _, text, _)) = known {
                 *remark = Remark::Limit {
                     text: format!("as in the public case: {text}"),
@@ -403,6 +402,7 @@ fn spread(public: &[&CaseEvidence], hidden: &[&CaseEvidence]) -> Option<Spread> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Capabilities;
     use crate::evidence::ReportIndex;
     use crate::fixtures::{ENGINE, MadeCase, capabilities, report};
     use crate::{Measure, RunId};
@@ -410,9 +410,15 @@ mod tests {
     use serde_json::json;
 
     fn cell_of(report: &Report, minimum: usize) -> Cell {
-        let capability = &capabilities(minimum).capabilities[0];
-        let evidence = ReportIndex::new(report).evidence(capability, &EngineName::from(ENGINE), &RunId::of(report));
-        judge(capability, &evidence)
+        let capabilities = capabilities(minimum);
+        judge(&capabilities.capabilities[0], &evidence_of(report, &capabilities))
+    }
+
+    /// The evidence about the one engine for the one capability.
+    fn evidence_of(report: &Report, capabilities: &Capabilities) -> Vec<CaseEvidence> {
+        let index = ReportIndex::new(report, capabilities);
+        let evidence = index.evidence(&EngineName::from(ENGINE), &RunId::of(report));
+        evidence.into_values().next().unwrap_or_default()
     }
 
     fn cell(given: &[MadeCase], minimum: usize) -> Cell {
@@ -557,9 +563,8 @@ mod tests {
         let mut capability = capabilities(2).capabilities[0].clone();
         capability.reads_files = true;
         let judged = |report: &Report| {
-            let evidence =
-                ReportIndex::new(report).evidence(&capability, &EngineName::from(ENGINE), &RunId::of(report));
-            judge(&capability, &evidence).standing
+            let capabilities = Capabilities { version: 1, capabilities: vec![capability.clone()] };
+            judge(&capability, &evidence_of(report, &capabilities)).standing
         };
         let mut report = report(ENGINE, "1.0", &three(MadeCase::new("a").off(0.0, 0.0)));
         let Standing::NotSupported { reason } = judged(&report) else { panic!("{:?}", judged(&report)) };
@@ -615,11 +620,10 @@ mod tests {
             report.cases.extend(with_variant.cases);
             report.recordings.extend(with_variant.recordings);
             report.comparisons.extend(with_variant.comparisons);
-            let capability = &capabilities(3).capabilities[0];
-            let mut evidence =
-                ReportIndex::new(&report).evidence(capability, &EngineName::from(ENGINE), &RunId::of(&report));
+            let capabilities = capabilities(3);
+            let mut evidence = evidence_of(&report, &capabilities);
             inherit_limits(&mut evidence);
-            let found = judge(capability, &evidence);
+            let found = judge(&capabilities.capabilities[0], &evidence);
             assert_eq!(matches!(found.standing, Standing::Limited { .. }), is_limited, "{found:?}");
             // The public case is not right, so nothing is tuned to it.
             assert!(!found.spread.unwrap().is_public_only);

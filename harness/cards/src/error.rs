@@ -1,5 +1,6 @@
 //! Why there are no cards.
 
+use luxproof_process::printable::Quoted;
 use luxproof_spec::{Faults, SpecError};
 
 /// Why reports give no cards.
@@ -8,15 +9,15 @@ pub enum CardsError {
     #[error(transparent)]
     Capabilities(#[from] Faults),
     #[error(
-        "{run} judges case {case} by the policy {policy}; cards need luxproof's own tolerances: run it again where no policy is found, or \
-         with a tolerance class of `verification`"
+        "{} judges case {} by the policy {}; cards need luxproof's own tolerances: run it again where no policy is found, or \
+         with a tolerance class of `verification`", Quoted(.run), Quoted(.case), Quoted(.policy)
     )]
     Policy { run: String, case: String, policy: String },
     #[error(
-        "{run} was judged for the tolerance class {class}; cards need `verification`: run it again without --tolerance-class"
+        "{} was judged for the tolerance class {class}; cards need `verification`: run it again without --tolerance-class", Quoted(.run)
     )]
     Class { run: String, class: String },
-    #[error("{run} has no case of a capability; docs/score-cards.md lists the specs that have")]
+    #[error("{} has no case of a capability; docs/score-cards.md lists the specs that have", Quoted(.run))]
     NoCase { run: String },
     #[error("a file of the site cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),

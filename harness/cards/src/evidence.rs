@@ -1,16 +1,16 @@
 //! The evidence of reports: how an engine did in each case that shows a capability.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use itertools::Itertools;
 use luxproof_model::{
-    Basis, CaseRecord, Comparison, DeviationKind, EngineName, FailureKind, HiddenVariant, ProcedureId, ReadingKey,
-    Recording, Report, Role, SkipCause, Verdict,
+    Basis, Bias, CaseRecord, Comparison, DeviationKind, EngineName, FailureKind, HiddenVariant, KnownDeviationOutcome,
+    ProcedureId, ReadingKey, Recording, Report, Role, Skip, SkipCause, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Capability, Deviation, RunId};
+use crate::{Capabilities, Capability, CapabilityId, Deviation, RunId};
 
 /// The name of the scenes of known answer in capabilities.
 const CALIBRATION: &str = "calibration";
@@ -116,45 +116,91 @@ pub struct PointEvidence {
     pub source: String,
 }
 
-/// A report, sorted by what cards look for.
+/// A report, sorted by what cards look for: each reading is looked up once, however many engines and cases there are.
 pub(crate) struct ReportIndex<'a> {
     report: &'a Report,
     comparisons: HashMap<&'a ReadingKey, Vec<&'a Comparison>>,
     recordings: HashMap<&'a ReadingKey, &'a Recording>,
+    skips: HashMap<&'a ReadingKey, &'a Skip>,
+    known_deviations: HashMap<&'a ReadingKey, Vec<&'a KnownDeviationOutcome>>,
+    bias: HashMap<&'a ReadingKey, Vec<&'a Bias>>,
+    /// What was asked of each engine: the place of the case in the report, and the procedure.
+    jobs: HashMap<&'a EngineName, BTreeSet<(usize, ProcedureId)>>,
+    /// The capabilities that a procedure of a case shows.
+    shown: HashMap<(&'a str, ProcedureId), Vec<&'a Capability>>,
 }
 
 impl<'a> ReportIndex<'a> {
-    pub(crate) fn new(report: &'a Report) -> Self {
-        let comparisons = report.comparisons.iter().map(|c| (&c.key, c)).into_group_map();
-        let recordings = report.recordings.iter().map(|r| (&r.key, r)).collect();
-        Self { report, comparisons, recordings }
+    pub(crate) fn new(report: &'a Report, capabilities: &'a Capabilities) -> Self {
+        let mut recordings: HashMap<&ReadingKey, &Recording> = HashMap::new();
+        let mut skips: HashMap<&ReadingKey, &Skip> = HashMap::new();
+        for recording in &report.recordings {
+            recordings.insert(&recording.key, recording);
+        }
+        for skip in report.skips.iter().filter(|skip| skip.scope.leaves_no_reading()) {
+            skips.entry(&skip.key).or_insert(skip);
+        }
+        let mut places: HashMap<&str, usize> = HashMap::new();
+        for (place, record) in report.cases.iter().enumerate() {
+            places.entry(&record.name).or_insert(place);
+        }
+        let mut jobs: HashMap<&EngineName, BTreeSet<(usize, ProcedureId)>> = HashMap::new();
+        for key in recordings.keys().chain(skips.keys()) {
+            if let Some(place) = places.get(key.case.as_str()) {
+                jobs.entry(&key.engine).or_default().insert((*place, key.procedure));
+            }
+        }
+        Self {
+            report,
+            comparisons: report.comparisons.iter().map(|c| (&c.key, c)).into_group_map(),
+            recordings,
+            skips,
+            known_deviations: report.known_deviations.iter().map(|known| (&known.key, known)).into_group_map(),
+            bias: report.bias.iter().map(|bias| (&bias.key, bias)).into_group_map(),
+            jobs,
+            shown: capabilities.by_procedure(),
+        }
     }
 
-    /// The evidence about an engine for a capability, in the order of the report.
-    pub(crate) fn evidence(&self, capability: &Capability, engine: &EngineName, run: &RunId) -> Vec<CaseEvidence> {
-        let mut found = vec![];
-        for record in &self.report.cases {
-            let case = case_name(record);
-            for procedure in capability.cases.iter().filter(|s| s.case == case).flat_map(|s| &s.procedures) {
-                let key = ReadingKey::new(&record.name, *procedure, engine.clone());
-                let Some(outcome) = self.outcome(&key, capability) else { continue };
-                let recording = self.recordings.get(&key);
-                found.push(CaseEvidence {
-                    case: case.to_owned(),
-                    reported_as: record.name.clone(),
-                    title: record.spec.title.clone(),
-                    spec: record.spec.path.clone(),
-                    procedure: *procedure,
-                    hidden: record.hidden_variant.clone(),
-                    run: run.clone(),
-                    engine: engine.clone(),
-                    content_sha256: recording.map(|r| r.content_sha256.clone()).unwrap_or_default(),
-                    command: recording.and_then(|r| r.command.clone()),
-                    outcome,
-                });
+    /// The evidence about an engine by capability, each in the order of the report.
+    pub(crate) fn evidence(&self, engine: &EngineName, run: &RunId) -> BTreeMap<&'a CapabilityId, Vec<CaseEvidence>> {
+        let mut found: BTreeMap<&CapabilityId, Vec<CaseEvidence>> = BTreeMap::new();
+        for (place, procedure) in self.jobs.get(engine).into_iter().flatten() {
+            let Some(record) = self.report.cases.get(*place) else { continue };
+            for capability in self.shown.get(&(case_name(record), *procedure)).into_iter().flatten() {
+                found
+                    .entry(&capability.id)
+                    .or_default()
+                    .extend(self.case_evidence(record, *procedure, engine, run, capability));
             }
         }
         found
+    }
+
+    fn case_evidence(
+        &self,
+        record: &CaseRecord,
+        procedure: ProcedureId,
+        engine: &EngineName,
+        run: &RunId,
+        capability: &Capability,
+    ) -> Option<CaseEvidence> {
+        let key = ReadingKey::new(&record.name, procedure, engine.clone());
+        let outcome = self.outcome(&key, capability)?;
+        let recording = self.recordings.get(&key);
+        Some(CaseEvidence {
+            case: case_name(record).to_owned(),
+            reported_as: record.name.clone(),
+            title: record.spec.title.clone(),
+            spec: record.spec.path.clone(),
+            procedure,
+            hidden: record.hidden_variant.clone(),
+            run: run.clone(),
+            engine: engine.clone(),
+            content_sha256: recording.map(|r| r.content_sha256.clone()).unwrap_or_default(),
+            command: recording.and_then(|r| r.command.clone()),
+            outcome,
+        })
     }
 
     /// What came of a job; `None` where the run did not ask for it.
@@ -177,8 +223,7 @@ impl<'a> ReportIndex<'a> {
     }
 
     fn skipped(&self, key: &ReadingKey) -> Option<Outcome> {
-        let mut skips = self.report.skips.iter().filter(|s| s.key == *key && s.scope.leaves_no_reading());
-        let skip = skips.next()?;
+        let skip = self.skips.get(key)?;
         let reason = skip.reason.clone();
         Some(match skip.cause {
             SkipCause::Unsupported => Outcome::Unsupported { reason },
@@ -220,7 +265,7 @@ impl<'a> ReportIndex<'a> {
                 let cause = cause.unwrap_or_else(|| "a known deviation".to_owned());
                 Some(if self.is_limit(c) { RemarkKey::Limit(cause) } else { RemarkKey::Fault(cause) })
             }
-            Verdict::Fail => match self.report.declared(c) {
+            Verdict::Fail => match self.recordings.get(&c.key).and_then(|recording| recording.declared(c)) {
                 Some(approximation) => Some(RemarkKey::Limit(format!("it declares: {approximation}"))),
                 None => Some(RemarkKey::Fault(cause.unwrap_or_default())),
             },
@@ -230,7 +275,7 @@ impl<'a> ReportIndex<'a> {
 
     /// Whether the known deviation behind a verdict is a limit of the method.
     fn is_limit(&self, c: &Comparison) -> bool {
-        let outcomes = self.report.known_deviations.iter().filter(|known| known.key == c.key);
+        let outcomes = self.known_deviations.get(&c.key).into_iter().flatten();
         let mut entries = outcomes.map(|known| &known.entry).filter(|entry| {
             let is_basis = entry.basis.is_none_or(|basis| c.basis() == Some(basis));
             is_basis && entry.is_at(c) && c.diagnosis.as_deref() == Some(entry.summary().as_str())
@@ -241,7 +286,7 @@ impl<'a> ReportIndex<'a> {
     /// Faults of means and of stated errors, which no single point shows.
     fn remarks_on_errors(&self, recording: &Recording, judged: &[&Comparison]) -> Vec<Remark> {
         let mut remarks = vec![];
-        let biases = self.report.bias.iter().filter(|bias| bias.fails && bias.key == recording.key);
+        let biases = self.bias.get(&recording.key).into_iter().flatten().filter(|bias| bias.fails);
         for bias in
             biases.filter(|bias| !judged.iter().any(|c| c.verdict == Verdict::Fail && c.basis() == Some(bias.basis)))
         {

@@ -12,6 +12,7 @@ mod error;
 mod evidence;
 mod release_label;
 pub mod site;
+mod site_folder;
 mod slug;
 
 #[cfg(test)]
@@ -27,4 +28,5 @@ pub use deviation::{Deviation, Measure};
 pub use error::CardsError;
 pub use evidence::{CaseEvidence, Measurement, Outcome, PointEvidence, Remark, VerdictCounts};
 pub use release_label::ReleaseLabel;
+pub use site_folder::{SITE_FILE, SiteFolder, SiteFolderError};
 pub use slug::slug;

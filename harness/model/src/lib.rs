@@ -289,6 +289,14 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// The approximation that the engine declares, where its declared error explains a failed comparison.
+    pub fn declared(&self, comparison: &Comparison) -> Option<&str> {
+        let (reference, budget) = (comparison.reference.as_ref()?.value, comparison.budget.as_ref()?);
+        let margin = comparison.tolerance.around(reference) + budget.expanded;
+        let is_within = comparison.deviation?.abs() <= self.declared_error? * reference.abs() + margin;
+        self.approximation.as_deref().filter(|_| is_within)
+    }
+
     /// Whether its standard errors show a heavy tail.
     pub fn states_heavy_tail(&self) -> bool {
         self.stated_errors.iter().any(|s| s.finding == Some(ErrorFinding::HeavyTail))

@@ -165,11 +165,7 @@ pub struct ReadingRecord {
 impl Report {
     /// The approximation that an engine declares, where its declared error explains a failed comparison.
     pub fn declared(&self, comparison: &Comparison) -> Option<&str> {
-        let recording = self.recordings.iter().find(|r| r.key == comparison.key)?;
-        let (reference, budget) = (comparison.reference.as_ref()?.value, comparison.budget.as_ref()?);
-        let margin = comparison.tolerance.around(reference) + budget.expanded;
-        let is_within = comparison.deviation?.abs() <= recording.declared_error? * reference.abs() + margin;
-        recording.approximation.as_deref().filter(|_| is_within)
+        self.recordings.iter().find(|r| r.key == comparison.key)?.declared(comparison)
     }
 
     /// The exit code of a run.

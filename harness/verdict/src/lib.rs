@@ -48,7 +48,7 @@ use papers::Input;
 
 pub use known::{KnownBreak, KnownDeviations};
 pub use papers::{Cell, PHOTOMETRY, Published, PublishedError, Stages, Standing, cells, paper_splits, shares};
-pub use policy::{POLICY_FILE, Policy, PolicyChoice, Profile, ProfileBudget, ProjectPolicy, overruled};
+pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicySearch, Profile, ProfileBudget, ProjectPolicy, overruled};
 pub use ratios::Measured;
 pub use sentences::sentences;
 pub use spending::{ERROR_SHARE_PER_STAGE, MAX_STAGES};

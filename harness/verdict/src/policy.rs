@@ -110,6 +110,29 @@ pub struct PolicyChoice {
     /// Purpose of the verdicts, which sets the tolerances [default: verification]
     #[arg(long, hide_short_help = true, value_name = "CLASS")]
     pub tolerance_class: Option<ToleranceClass>,
+    /// Where a policy is searched that is not named.
+    #[arg(skip)]
+    pub search: PolicySearch,
+}
+
+/// Where policies are searched that are not named.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PolicySearch {
+    /// In the folder of each spec and the folders above it.
+    #[default]
+    AroundSpecs,
+    /// Nowhere: luxproof's own tolerances judge specs that it wrote itself, wherever they lie.
+    Nowhere,
+}
+
+impl PolicySearch {
+    /// The policy that is found for a case.
+    fn find(self, case: &Case) -> Option<PathBuf> {
+        match self {
+            Self::AroundSpecs => nearest(case),
+            Self::Nowhere => None,
+        }
+    }
 }
 
 impl PolicyChoice {
@@ -121,7 +144,7 @@ impl PolicyChoice {
         let declared: BTreeSet<&str> =
             cases.iter().flat_map(|c| c.engines.iter().flat_map(|e| e.keys().map(String::as_str))).collect();
         for case in cases {
-            let file = self.file.clone().or_else(|| nearest(case));
+            let file = self.file.clone().or_else(|| self.search.find(case));
             if let Some(policy) = read.get(&file) {
                 policies.push(Arc::clone(policy));
                 continue;

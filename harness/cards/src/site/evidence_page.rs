@@ -186,6 +186,8 @@ fn run_entry(run: &CardRun, release: &ReleaseEvidence) -> Markup {
             "Run of " (run.started.replace('T', " ").replace('Z', " UTC")) " by luxproof " (run.tool) ". "
             @match &run.verification {
                 Verification::Own => {},
+                Verification::Submitted { .. } => { "Submitted as a bundle, and not run again by the publisher. " },
+                Verification::Unverified => { "A report of somebody else, without its inputs. " },
                 Verification::Reproduced { same_bytes, within, .. } => {
                     "Submitted, and run again by the publisher: " (same_bytes) " to the byte, " (within) " within uncertainties. "
                 }

@@ -21,7 +21,8 @@ use super::{BundleError, LOCK, Lock, PythonLock, RUN, SUMS};
 use luxproof_model::REPORT_FILE;
 use luxproof_model::{Report, Request};
 use luxproof_process::digest::{self, hexadecimal};
-use luxproof_process::files::{self, FileError};
+use luxproof_process::files::{self, FileError, MAX_KEPT_BYTES, read_bounded};
+use luxproof_process::printable::quoted_path;
 use luxproof_spec::Resolve;
 use luxproof_spec::{BUNDLE_FILE, Case, Trust};
 
@@ -67,15 +68,28 @@ pub fn make(run: &Path, out: &Path, licence: Option<&str>, trust: Trust) -> Resu
         })
         .map_err(failed)?;
     } else {
-        let is_free =
-            out.join(BUNDLE_FILE).is_file() || out.read_dir().is_ok_and(|mut entries| entries.next().is_none());
-        if out.exists() && !is_free {
-            return Err(BundleError::Occupied(out.display().to_string()));
-        }
+        refuse_other_files(out)?;
         files::replace_folder(out, |folder| copy_all(stage.path(), &sums, folder)).map_err(failed)?;
     }
     let sha256 = hexadecimal(&Sha256::digest(text));
     Ok(BundleSummary { place: out.to_owned(), sha256, files: sums.len() + 1, bytes, not_bundled })
+}
+
+/// Refuses a folder with any file that no list of hashes there names: only a bundle is replaced.
+fn refuse_other_files(folder: &Path) -> Result<(), BundleError> {
+    if folder.exists() && !folder.is_dir() {
+        return Err(BundleError::Occupied(quoted_path(folder)));
+    }
+    let listed = read_bounded(&folder.join(SUMS), MAX_KEPT_BYTES).ok().and_then(|text| String::from_utf8(text).ok());
+    let listed = listed.and_then(|text| sums::parse(&text)).unwrap_or_default();
+    for entry in WalkDir::new(folder).min_depth(1).into_iter().flatten().filter(|entry| !entry.file_type().is_dir()) {
+        let name = entry.path().strip_prefix(folder).ok().and_then(name);
+        let is_listed = name.is_some_and(|name| listed.contains_key(&name) || (name == SUMS && !listed.is_empty()));
+        if !is_listed {
+            return Err(BundleError::Occupied(quoted_path(entry.path())));
+        }
+    }
+    Ok(())
 }
 
 /// Copies every file of a bundle, its list of hashes included, to a folder.

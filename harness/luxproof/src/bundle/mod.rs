@@ -19,6 +19,7 @@ use luxproof_model::EngineStatus;
 use luxproof_model::Request;
 use luxproof_model::Tool;
 use luxproof_process::files::FileError;
+use luxproof_process::printable::quoted;
 use luxproof_report_file::ReadError;
 use luxproof_spec::Faults;
 
@@ -75,7 +76,7 @@ pub enum BundleError {
     Absolute { spec: String, file: String },
     #[error("{} cannot be the name of a file in a bundle: rename it, and run its spec again", .0.display())]
     Name(PathBuf),
-    #[error("{0} holds files and no bundle: name another folder with --out")]
+    #[error("{0} is there, and is no file of a bundle that luxproof wrote: name another folder with --out")]
     Occupied(String),
     #[error("{0} is no bundle: it holds no SHA256SUMS")]
     NoBundle(String),
@@ -85,7 +86,7 @@ pub enum BundleError {
     Version(String),
     #[error("{0}: {1}")]
     Zip(String, zip::result::ZipError),
-    #[error("{bundle}: {file} cannot be read: {source}")]
+    #[error("{bundle}: {file} cannot be read: {}", quoted(&.source.to_string()))]
     Json { bundle: String, file: String, source: serde_json::Error },
 }
 

@@ -14,15 +14,20 @@ use super::views::{read_report, report_file};
 use super::{at_least_one, not_audited};
 use crate::bundle::{self, Opened, Outcome, Reproduction};
 use luxproof_audit::Options;
-use luxproof_cards::{Capabilities, CardRun, Cards, CaseDifference, RunId, Verification, compare_cases, site};
+use luxproof_cards::{
+    Capabilities, CardRun, Cards, CaseDifference, RunId, SiteFolder, Verification, compare_cases, site,
+};
 use luxproof_console::{complain, diagnose, print};
 use luxproof_engines::EngineRoot;
 use luxproof_lab::variants::{VariantError, draw_variants};
 use luxproof_model::numbers::plural;
 use luxproof_model::{Exit, REPORT_FILE, Report, Role};
 use luxproof_process::files::{self, FileError};
+use luxproof_process::foreign_json;
+use luxproof_process::printable::quoted;
 use luxproof_process::process;
 use luxproof_spec::Trust;
+use luxproof_verdict::{PolicyChoice, PolicySearch};
 
 /// The folder of runs on a site.
 const RUNS: &str = "runs";
@@ -122,7 +127,7 @@ fn draw(args: &CardsArgs, trust: Trust) -> Result<Exit, Diagnostic> {
         ));
     };
     let capabilities = match &args.capabilities {
-        Some(file) => Capabilities::read(file).map_err(diagnose)?,
+        Some(file) => Capabilities::read(file, trust).map_err(diagnose)?,
         None => Capabilities::built_in().map_err(diagnose)?,
     };
     let sources = args.from.iter().map(|path| source(path, args.no_bundles, trust)).collect::<Result<Vec<_>, _>>()?;
@@ -133,11 +138,12 @@ fn draw(args: &CardsArgs, trust: Trust) -> Result<Exit, Diagnostic> {
 
 /// A run or a bundle that the command line names.
 fn source(path: &Path, no_bundle: bool, trust: Trust) -> Result<Source, Diagnostic> {
-    let is_run = report_file(path).is_file() && !path.join("SHA256SUMS").is_file();
-    if !is_run && bundle::is_bundle(path) {
+    let is_folder_of_run = path.is_dir() && report_file(path).is_file() && !path.join("SHA256SUMS").is_file();
+    if !is_folder_of_run && bundle::is_bundle(path) {
         let opened = Opened::read(path, Trust::Bundled).map_err(refused)?;
         let (report, file) = (opened.report.clone(), opened.report_file());
-        let run = CardRun::of(&report, Verification::Own);
+        // A bundle may be a stranger's: only `cards add` runs it again.
+        let run = CardRun::of(&report, Verification::Submitted { bundle_sha256: opened.sha256.clone() });
         let bundle = if no_bundle { BundleSource::None } else { BundleSource::Opened(Box::new(opened)) };
         return Ok(Source { run, report, file, bundle });
     }
@@ -145,7 +151,8 @@ fn source(path: &Path, no_bundle: bool, trust: Trust) -> Result<Source, Diagnost
     let file = report_file(path);
     let folder = file.parent().unwrap_or(Path::new("")).to_owned();
     let bundle = if no_bundle || trust != Trust::Own { BundleSource::None } else { BundleSource::Run(folder) };
-    Ok(Source { run: CardRun::of(&report, Verification::Own), report, file, bundle })
+    let verification = if trust == Trust::Own { Verification::Own } else { Verification::Unverified };
+    Ok(Source { run: CardRun::of(&report, verification), report, file, bundle })
 }
 
 /// Writes the whole site in place of the one that is there.
@@ -155,11 +162,8 @@ fn write_site(
     sources: Vec<Source>,
     trust: Trust,
 ) -> Result<Cards, Diagnostic> {
-    let is_free =
-        out.join(site::CARDS_FILE).is_file() || out.read_dir().is_ok_and(|mut entries| entries.next().is_none());
-    if out.exists() && !is_free {
-        return Err(miette!(help = "name another folder", "{} holds files and no site of score cards", out.display()));
-    }
+    super::refuse_links(out, trust)?;
+    let earlier = SiteFolder::open(out).into_diagnostic()?;
     let mut seen: BTreeSet<RunId> = BTreeSet::new();
     let mut sources: Vec<Source> = sources.into_iter().filter(|source| seen.insert(source.run.id.clone())).collect();
     // Bundles are packed first: they may be many MB, and the site names only those that exist.
@@ -193,7 +197,7 @@ fn write_site(
         }
         Ok(())
     };
-    files::replace_folder(out, fill).map_err(|e| FileError::of(out, e)).into_diagnostic()?;
+    earlier.replace(fill).into_diagnostic()?;
     Ok(cards)
 }
 
@@ -260,6 +264,7 @@ fn add(args: &AddArgs, engines: &EngineRoot, trust: Trust) -> Result<Exit, Diagn
         return Err(miette!("--trusted and --untrusted (or LUXPROOF_UNTRUSTED) contradict each other"));
     }
     let of_bundle = if args.trusted { Trust::Own } else { Trust::Bundled };
+    SiteFolder::open(&args.site).into_diagnostic()?;
     let (published, mut sources) = read_site(&args.site)?;
     let opened = Opened::read(&args.bundle, of_bundle).map_err(refused)?;
     complain(&format!("{}: {} files, whole; SHA-256 {}", args.bundle.display(), opened.files, opened.sha256));
@@ -316,8 +321,13 @@ fn refuse(args: &AddArgs, reason: &str) -> Exit {
 fn read_site(folder: &Path) -> Result<(Cards, Vec<Source>), Diagnostic> {
     let file = folder.join(site::CARDS_FILE);
     let bytes = files::read_stored(&file).into_diagnostic()?;
-    let cards: Cards = serde_json::from_slice(&bytes).map_err(|e| {
-        miette!(help = "luxproof cards RUN... --out DIR makes one", "{} is no site of score cards: {e}", file.display())
+    let cards: Cards = foreign_json::from_slice(&bytes).map_err(|e| {
+        let why = quoted(&e.to_string());
+        miette!(
+            help = "luxproof cards RUN... --out DIR makes one",
+            "{} is no site of score cards: {why}",
+            file.display()
+        )
     })?;
     let mut sources = vec![];
     for run in &cards.runs {
@@ -402,8 +412,10 @@ fn hidden_run<'a>(
     let out = scratch.join("hidden-run");
     let request = opened.lock.request.clone();
     let request = luxproof_model::Request { filter: vec![], no_calibration: true, ..request };
-    // The variants lie outside of the bundle. Their text is luxproof's own, and their inputs were checked.
-    let options = Options { trust: Trust::Own, out: out.clone(), ..options().with_request(&request) };
+    // The variants lie outside of the bundle. Their text is luxproof's own, and their inputs were checked. A policy
+    // around the temporary folder is not ours.
+    let mut options = Options { trust: Trust::Own, out: out.clone(), ..options().with_request(&request) };
+    options.policy = PolicyChoice { search: PolicySearch::Nowhere, ..PolicyChoice::default() };
     let report = luxproof_audit::run(&specs, &options).map_err(not_audited)?;
     complain(&format!("hidden variants: {}, seed {seed}", plural(specs.len(), "case")));
     let run = CardRun::of(&report, Verification::Own);
