@@ -369,7 +369,8 @@ fn status(planned: &Planned, recordings: &[Recording], site: Option<&EngineRoot>
     let version = planned.version();
     let release = site.filter(|_| version.is_some()).and_then(|site| luxproof_engines::installed_release(&id, site));
     let release = release.map(|release| release.to_string());
-    EngineStatus { id, version, release, role, fingerprint, status, is_required, reason, wall_s, mark }
+    let package = site.filter(|_| version.is_some()).and_then(|site| luxproof_engines::installed_package(&id, site));
+    EngineStatus { id, version, release, package, role, fingerprint, status, is_required, reason, wall_s, mark }
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ pub(crate) fn add_recorded(case: &Case, plan: &Plan, selection: &Selection, outc
             id: engine,
             version: Some(version(readings)),
             release: None,
+            package: None,
             role: Role::Recorded,
             fingerprint: None,
             status,

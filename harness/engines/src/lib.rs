@@ -65,7 +65,7 @@ pub use install::{InstallOutcome, InstallState, Soundness, install, locks, repai
 pub use job_dir::{EngineError, JobDir, PartialMeasurement, SceneFile, SharedPrecompute};
 pub use luxproof_spec::Budget;
 pub use released::{Unknown, all_built_in, built_in};
-pub use releases::{KnownRelease, installed_release, releases_of};
+pub use releases::{KnownRelease, installed_package, installed_release, releases_of};
 pub use settings::Coordinates;
 
 /// The engine that everybody has by this name, or else a program of the user's.

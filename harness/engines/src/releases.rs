@@ -121,6 +121,13 @@ pub fn installed_release(engine: &str, site: &EngineRoot) -> Option<Release> {
     of(engine).find(|known| known.home == Home::Shared && known.is_in(site)).and_then(KnownRelease::release)
 }
 
+/// The package of an engine with its release, such as `pyradiance 1.3.1`, where it is one that we know.
+pub fn installed_package(engine: &EngineName, site: &EngineRoot) -> Option<String> {
+    let of_default = || of(engine.as_str()).find(|release| release.home == Home::Shared && release.is_in(site));
+    let found = known(engine.as_str()).or_else(of_default)?;
+    Some(found.package.replacen('-', " ", 1))
+}
+
 /// A release by its name.
 pub(super) fn known(name: &str) -> Option<&'static KnownRelease> {
     KNOWN.iter().find(|known| known.name == name)
@@ -166,5 +173,9 @@ mod tests {
         assert!(!known.is_in(&site));
         std::fs::create_dir_all(packages.join("mitsuba-3.5.2.dist-info")).unwrap();
         assert!(known.is_in(&site));
+        let of_name = |name| installed_package(&EngineName::new(name), &EngineRoot::at(root.path()));
+        assert_eq!(of_name("mitsuba@3.5.2"), Some("mitsuba 3.5.2".to_owned()));
+        // No default installation is there.
+        assert_eq!(of_name("radiance"), None);
     }
 }

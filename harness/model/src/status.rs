@@ -15,6 +15,9 @@ pub struct EngineStatus {
     /// The release of a default installation, such as `1.3.1` of `radiance`; a release in the name is not repeated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub release: Option<String>,
+    /// The package that it was installed from, such as `pyradiance 1.3.1`: the program's own version may be another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub package: Option<String>,
     /// Whether it is judged or a reference.
     #[serde(default)]
     pub role: Role,
@@ -114,7 +117,9 @@ pub enum FailureKind {
     /// It rejects this job: a setting is invalid for it, or its solver gave up.
     Refused,
     Nan,
-    /// It ended with an error or was killed.
+    /// It ended with an error code and a message.
+    ErrorExit,
+    /// It was killed, or ended with an error and no message.
     Crash,
     Hang,
     /// It ended normally without all readings.

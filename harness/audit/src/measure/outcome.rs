@@ -72,6 +72,7 @@ impl From<EngineError> for Failure {
         let kind = match error {
             EngineError::Process(ProcessError::TimedOut { .. }) => FailureKind::Hang,
             EngineError::Process(ProcessError::Interrupted { .. }) => FailureKind::Interrupted,
+            EngineError::Process(error) if error.has_stated_reason() => FailureKind::ErrorExit,
             EngineError::Process(_) | EngineError::Io { .. } => FailureKind::Crash,
             EngineError::NotFinite { .. } => FailureKind::Nan,
             EngineError::Output { .. } => FailureKind::SilentLoss,

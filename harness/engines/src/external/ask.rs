@@ -178,10 +178,10 @@ pub(super) fn may_succeed_alone(error: &EngineError) -> bool {
 /// An error in words, without the log of a folder that is gone.
 fn without_log(error: &EngineError) -> String {
     match error {
-        EngineError::Process(ProcessError::Failed { status, tail, .. }) if tail.is_empty() => {
-            format!("it ends with {status}")
+        EngineError::Process(ProcessError::Failed { end, tail, .. }) if tail.is_empty() => {
+            format!("it ends with {end}")
         }
-        EngineError::Process(ProcessError::Failed { status, tail, .. }) => format!("it ends with {status}: {tail}"),
+        EngineError::Process(ProcessError::Failed { end, tail, .. }) => format!("it ends with {end}: {tail}"),
         EngineError::Process(ProcessError::TimedOut { limit_s, .. }) => {
             format!("it takes longer than {limit_s:.0} s; `start_seconds` gives it more time")
         }

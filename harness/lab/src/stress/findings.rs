@@ -58,7 +58,7 @@ impl Finding {
             | FailureKind::TimeUp
             | FailureKind::Unread => None,
             FailureKind::Nan => Some(LawBreach::Nan),
-            FailureKind::Crash => Some(LawBreach::Crash),
+            FailureKind::ErrorExit | FailureKind::Crash => Some(LawBreach::Crash),
             FailureKind::Hang => Some(LawBreach::Hang),
             FailureKind::SilentLoss | FailureKind::Garbled => Some(LawBreach::SilentLoss),
         };

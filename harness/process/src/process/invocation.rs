@@ -1,6 +1,7 @@
 //! What is run, where, and what it may do and take.
 
 use std::ffi::OsString;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -46,6 +47,40 @@ pub struct Finished {
     pub wall: Duration,
 }
 
+/// How a program ended that did not end well.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailedEnd {
+    ExitCode(i32),
+    Signal(i32),
+    Unknown,
+}
+
+impl fmt::Display for FailedEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ExitCode(code) => write!(f, "exit code {code}"),
+            Self::Signal(9) => f.write_str("killed by signal 9, out of memory perhaps"),
+            Self::Signal(signal) => write!(f, "killed by signal {signal}"),
+            Self::Unknown => f.write_str("ended for an unknown reason"),
+        }
+    }
+}
+
+/// The first exit code by which a shell reports that a signal killed the program.
+const FIRST_SIGNAL_CODE: i32 = 128;
+
+impl ProcessError {
+    /// Whether the program ended by itself, with an error code and a message that says why.
+    pub fn has_stated_reason(&self) -> bool {
+        match self {
+            Self::Failed { end: FailedEnd::ExitCode(code), tail, .. } => {
+                *code < FIRST_SIGNAL_CODE && !tail.trim().is_empty()
+            }
+            _ => false,
+        }
+    }
+}
+
 #[derive(Debug, thiserror::Error)]
 pub enum ProcessError {
     #[error("cannot run {program}: {source}")]
@@ -54,8 +89,8 @@ pub enum ProcessError {
     Log { program: String, log: String, source: std::io::Error },
     #[error("{program} was killed after its limit of {limit_s:.1} s; its messages are in {log}")]
     TimedOut { program: String, limit_s: f64, log: String },
-    #[error("{program} failed ({status}): {tail}\nall its messages are in {log}")]
-    Failed { program: String, status: String, tail: String, log: String },
+    #[error("{program} failed ({end}): {tail}\nall its messages are in {log}")]
+    Failed { program: String, end: FailedEnd, tail: String, log: String },
     #[error("{program} ended without an answer; its messages are in {log}")]
     Silent { program: String, log: String },
     #[error(

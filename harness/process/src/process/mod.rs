@@ -28,7 +28,7 @@ use std::time::Duration;
 
 pub use conversation::{Conversation, ProcessPool};
 pub use interrupt::{UnderWay, interrupt, interrupt_flag, is_interrupted};
-pub use invocation::{Finished, Freedom, Invocation, ProcessError, quoted};
+pub use invocation::{FailedEnd, Finished, Freedom, Invocation, ProcessError, quoted};
 pub use memory::{PeakMemory, limit_mib};
 #[cfg(target_os = "linux")]
 use supervisor as system;

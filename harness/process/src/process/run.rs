@@ -8,7 +8,7 @@ use std::thread;
 use std::time::Instant;
 
 use super::interrupt::is_interrupted;
-use super::invocation::{Finished, Invocation, ProcessError};
+use super::invocation::{FailedEnd, Finished, Invocation, ProcessError};
 use super::memory;
 use super::output::{Answer, Messages};
 use super::running::Running;
@@ -86,13 +86,12 @@ impl Invocation {
         if running.is_unstarted(status) {
             return Err(self.start_error(std::io::Error::other(tail(stderr, 1))));
         }
-        let status = match (status.code(), status.signal()) {
-            (Some(code), _) => format!("exit code {code}"),
-            (None, Some(9)) => "killed by signal 9, out of memory perhaps".to_owned(),
-            (None, Some(signal)) => format!("killed by signal {signal}"),
-            (None, None) => "ended for an unknown reason".to_owned(),
+        let end = match (status.code(), status.signal()) {
+            (Some(code), _) => FailedEnd::ExitCode(code),
+            (None, Some(signal)) => FailedEnd::Signal(signal),
+            (None, None) => FailedEnd::Unknown,
         };
-        Err(ProcessError::Failed { program: self.name(), status, tail: tail(stderr, LAST_WORDS), log: self.log_name() })
+        Err(ProcessError::Failed { program: self.name(), end, tail: tail(stderr, LAST_WORDS), log: self.log_name() })
     }
 
     pub(super) fn keep_log(&self, stderr: &str) -> Result<(), ProcessError> {

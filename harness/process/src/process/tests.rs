@@ -42,8 +42,17 @@ fn a_failing_program_is_an_error_with_its_last_words() {
     let folder = tempfile::tempdir().unwrap();
     let error = shell("echo no such lamp >&2; exit 3", 10.0, folder.path()).unwrap_err();
     let text = error.to_string();
-    assert!(matches!(error, ProcessError::Failed { .. }));
+    assert!(matches!(error, ProcessError::Failed { end: FailedEnd::ExitCode(3), .. }) && error.has_stated_reason());
     assert!(text.contains("exit code 3") && text.contains("no such lamp"), "{text}");
+}
+
+#[test]
+fn a_program_states_no_reason_where_a_signal_kills_it_or_it_says_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for script in ["echo about to crash >&2; kill -SEGV $$", "echo a shell tells of a signal >&2; exit 139", "exit 1"] {
+        let error = shell(script, 10.0, folder.path()).unwrap_err();
+        assert!(!error.has_stated_reason(), "{script}: {error}");
+    }
 }
 
 #[test]
