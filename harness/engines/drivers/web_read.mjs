@@ -32,6 +32,21 @@ async function launched(env, triesLeft) {
 // Each job draws in a context of its own, of which Chromium keeps sixteen.
 const JOBS_OF_A_PAGE = 8;
 
+// A page that loads or answers for longer hangs: usual jobs take less than ten seconds.
+const MAX_PAGE_MS = 120_000;
+
+/** What a page answers, or an error where it does not answer in time. */
+async function inTime(answer) {
+  let timer;
+  const late = new Promise((_, failed) => {
+    timer = setTimeout(() => {
+      isBroken = true;
+      failed(new Error(`the page gave no answer within ${MAX_PAGE_MS / 1000} s`));
+    }, MAX_PAGE_MS);
+  });
+  return Promise.race([answer, late]).finally(() => clearTimeout(timer));
+}
+
 /** A renderer in its page: what it logs, and the folders of the jobs that it was asked. */
 class Renderer {
   constructor(source, root) {
@@ -52,6 +67,7 @@ class Renderer {
       console.error(`${message.type()}: ${message.text()}`);
       if (message.type() === "error") this.troubles.push(message.text());
     });
+    this.page.on("crash", () => { isBroken = true; });
     this.page.on("pageerror", (error) => this.troubles.push(String(error)));
     await this.page.route("**/*", (route) => {
       const name = decodeURIComponent(new URL(route.request().url()).pathname);
@@ -60,7 +76,7 @@ class Renderer {
       return fs.existsSync(at) ? route.fulfill({ contentType, body: fs.readFileSync(at) }) : route.fulfill({ status: 404, body: "" });
     });
     await this.page.goto(HOST);
-    await this.page.waitForFunction(() => window.illuminance, null, { timeout: 0 }).catch((error) => { throw this.troubles[0] ?? error; });
+    await this.page.waitForFunction(() => window.illuminance, null, { timeout: MAX_PAGE_MS }).catch((error) => { throw this.troubles[0] ?? error; });
   }
 
   async answer(job, folder) {
@@ -68,7 +84,7 @@ class Renderer {
     // What a job that was answered complained of afterwards is in its log.
     if (number > 0) this.troubles.length = 0;
     const lamps = job.lamps.map((lamp) => ({ ...lamp, file: `${number}/${lamp.file}` }));
-    const answer = await this.page.evaluate((job) => window.illuminance(job), { ...job, lamps });
+    const answer = await inTime(this.page.evaluate((job) => window.illuminance(job), { ...job, lamps }));
     return { ...answer, troubles: this.troubles };
   }
 }
@@ -84,6 +100,8 @@ const home = fs.mkdtempSync(path.join(os.tmpdir(), "browser-"));
 process.env.TMPDIR = home;
 const browser = await launched({ ...process.env, HOME: home, XDG_CONFIG_HOME: home, XDG_CACHE_HOME: home }, 2);
 const renderers = new Map();
+let isBroken = false;
+browser.on("disconnected", () => { isBroken = true; });
 try {
   for await (const jobFile of jobFiles()) {
     const job = JSON.parse(fs.readFileSync(jobFile, "utf8")), folder = path.dirname(path.resolve(jobFile));
@@ -100,8 +118,11 @@ try {
 } catch (error) {
   // A report tells the first line of a failure: what is wrong, without the page's stack.
   console.error(String(error?.message ?? error).split("\n")[0]);
-  process.exitCode = 1;
+  // A page that crashes or hangs refuses nothing: 134 is what a shell reports of a program that aborts.
+  process.exitCode = isBroken ? 134 : 1;
 } finally {
   await browser.close();
   fs.rmSync(home, { recursive: true, force: true });
 }
+// Standard input may stay open, and would keep this program alive without an answer.
+process.exit();

@@ -176,7 +176,8 @@ fn with_kernels(run: Invocation, site: &EngineRoot) -> Invocation {
     let folder = site.kernels();
     // Where it cannot be made they are compiled each time, and Dr.Jit says so in the log.
     std::fs::create_dir_all(&folder).ok();
-    run.env("DRJIT_CACHE_DIR", &folder).may_write(folder)
+    // Releases of Dr.Jit before 1.5 know `~/.drjit` only, and end where they cannot make it.
+    run.env("DRJIT_CACHE_DIR", &folder).env("HOME", &folder).may_write(folder)
 }
 
 fn probe(site: &EngineRoot, python: &Path, variant: &str, llvm: Option<&Path>) -> Result<Versions, String> {
@@ -204,6 +205,18 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let absent = Backend::find(&EngineRoot::at(folder.path())).unwrap_err();
         assert!(absent.to_string().contains("luxproof engines install"), "{absent}");
+    }
+
+    #[test]
+    fn every_release_of_dr_jit_finds_a_folder_for_its_kernels() {
+        let folder = tempfile::tempdir().unwrap();
+        let site = EngineRoot::at(folder.path());
+        let run = with_kernels(Invocation::new("python", folder.path(), PROBE_LIMIT, folder.path().join("log")), &site);
+        for variable in ["DRJIT_CACHE_DIR", "HOME"] {
+            let value = run.env.iter().find(|(name, _)| name == variable).map(|(_, value)| PathBuf::from(value));
+            assert_eq!(value, Some(site.kernels()), "{variable}");
+        }
+        assert!(site.kernels().is_dir());
     }
 
     #[test]
