@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use itertools::Itertools;
 use luxproof_model::{EngineName, HiddenVariant, ProcedureId, Report, Request, Role, Status, ToleranceClass, Tool};
+use luxproof_process::process::quoted;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::cell::inherit_limits;
 use crate::evidence::ReportIndex;
 use crate::{Capabilities, CapabilityId, CardsError, CaseEvidence, Cell, ReleaseLabel, judge, slug};
 
@@ -49,6 +49,9 @@ pub struct ReleaseCard {
     pub release: ReleaseLabel,
     /// Versions as the engine reports them.
     pub versions: BTreeSet<String>,
+    /// The packages that it was installed from, such as `pyradiance 1.3.1`.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub packages: BTreeSet<String>,
     /// Whether its values are recorded ones, which cannot be run again.
     pub is_recorded: bool,
     pub runs: BTreeSet<RunId>,
@@ -129,6 +132,9 @@ pub struct CardRun {
     pub report: Option<String>,
     /// Its bundle on the site, likewise.
     pub bundle: Option<String>,
+    /// The place of each spec in the bundle, by the path that the run was given.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub bundled_specs: BTreeMap<String, String>,
     pub verification: Verification,
 }
 
@@ -157,10 +163,18 @@ pub enum Verification {
 }
 
 impl CardRun {
-    /// The command that repeats these specs with one engine of the run.
+    /// The command that repeats these specs with one engine, in the unpacked bundle.
     pub fn command(&self, specs: &[String], engine: &EngineName) -> Option<String> {
-        let request = self.request.clone().filter(|_| !specs.is_empty())?;
-        Some(Request { engines: vec![engine.to_string()], filter: vec![], ..request }.command(specs))
+        let bundled: Vec<String> = specs.iter().filter_map(|spec| self.bundled_specs.get(spec).cloned()).collect();
+        let request = self.request.clone().filter(|_| !bundled.is_empty() && bundled.len() == specs.len())?;
+        Some(Request { engines: vec![engine.to_string()], filter: vec![], policy: None, ..request }.command(&bundled))
+    }
+
+    /// The command that writes the scene of a case for a run by hand, in the unpacked bundle.
+    pub fn export_command(&self, case: &CaseEvidence) -> Option<String> {
+        let spec = self.bundled_specs.get(&case.spec).filter(|_| case.is_exportable)?;
+        let [spec, engine] = [spec, case.engine.as_str()].map(quoted);
+        Some(format!("luxproof export {spec} --engine {engine} --procedures {} --out by-hand", case.procedure.name()))
     }
 
     /// The record of a report.
@@ -175,6 +189,7 @@ impl CardRun {
             request: report.request.clone(),
             report: None,
             bundle: None,
+            bundled_specs: BTreeMap::new(),
             verification,
         }
     }
@@ -203,6 +218,7 @@ pub struct ReleaseEvidence {
 #[derive(Default)]
 struct Release {
     versions: BTreeSet<String>,
+    packages: BTreeSet<String>,
     is_recorded: bool,
     runs: BTreeSet<RunId>,
     /// By capability; of a case in several runs the newest counts.
@@ -238,6 +254,7 @@ impl Cards {
                 }
                 let release = renderers.entry(status.id.family().to_owned()).or_default().entry(label).or_default();
                 release.versions.extend(status.version.clone());
+                release.packages.extend(status.package.clone());
                 release.is_recorded |= status.role == Role::Recorded;
                 release.add(evidence, &run.id, &status.id);
             }
@@ -325,9 +342,8 @@ fn renderer_card(
     for (label, mut release) in releases {
         let mut cells = vec![];
         for capability in &capabilities.capabilities {
-            let mut cases: Vec<CaseEvidence> =
+            let cases: Vec<CaseEvidence> =
                 release.evidence.remove(&capability.id).map(|cases| cases.into_values().collect()).unwrap_or_default();
-            inherit_limits(&mut cases);
             let cell = judge(capability, &cases);
             let before = tested.get(&capability.id).map(|(_, cell)| cell);
             cells.push(cell_card(&folder, &label, capability.id.clone(), cell.clone(), before));
@@ -338,8 +354,8 @@ fn renderer_card(
         for cell in cells.iter().filter(|cell| !cell.cell.standing.is_untested()) {
             tested.insert(cell.capability.clone(), (label.clone(), cell.clone()));
         }
-        let Release { versions, is_recorded, runs, .. } = release;
-        cards.push(ReleaseCard { release: label, versions, is_recorded, runs, cells, changes });
+        let Release { versions, packages, is_recorded, runs, .. } = release;
+        cards.push(ReleaseCard { release: label, versions, packages, is_recorded, runs, cells, changes });
     }
     cards.reverse();
     for (capability, mut releases) in evidence {
@@ -371,7 +387,52 @@ pub(crate) fn anchor(label: &ReleaseLabel) -> String {
     format!("r-{}", slug(label.as_str()))
 }
 
+impl RendererCard {
+    /// Since when its newest release is in the state of a cell; `None` where only one release was tested.
+    pub fn since(&self, capability: &CapabilityId) -> Option<Since<'_>> {
+        let tested = self.releases.iter().filter_map(|release| Some((release, release.cell(capability)?)));
+        let tested: Vec<_> = tested.filter(|(_, cell)| !cell.cell.standing.is_untested()).collect();
+        let ((newest, now), _) = tested.split_first().filter(|(_, earlier)| !earlier.is_empty())?;
+        // What the newest release is not tested for has no state since when.
+        if self.releases.first().is_none_or(|first| first.release != newest.release) {
+            return None;
+        }
+        let state = now.cell.standing.key();
+        Some(match tested.iter().position(|(_, cell)| cell.cell.standing.key() != state) {
+            None => Since::All { releases: tested.len() },
+            Some(k) => Since::Release { since: &tested[k - 1].0.release, before: tested[k].1 },
+        })
+    }
+}
+
+/// Since when a cell is in its state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Since<'a> {
+    /// In every tested release.
+    All { releases: usize },
+    /// Since a release; the cell of the tested one before it.
+    Release { since: &'a ReleaseLabel, before: &'a CellCard },
+}
+
 impl ReleaseCard {
+    /// Its versions with the packages that it was installed from: `pyradiance 1.3.1, program 6.0a`.
+    pub fn version_text(&self) -> String {
+        let packages = self.packages.iter().join(", ");
+        let programs = self.versions.iter().map(|version| self.program_version(version));
+        let programs = programs.filter(|version| !version.is_empty()).join(", ");
+        match (packages.is_empty(), programs.is_empty()) {
+            (true, _) => programs,
+            (false, true) => packages,
+            (false, false) => format!("{packages}, program {programs}"),
+        }
+    }
+
+    /// A version without the package that may stand before it, as in `pyradiance-1.0.0, 6.0a`.
+    fn program_version<'a>(&self, version: &'a str) -> &'a str {
+        let mut rests = self.packages.iter().filter_map(|package| version.strip_prefix(&package.replacen(' ', "-", 1)));
+        rests.next().map_or(version, |rest| rest.trim_start_matches([',', ' ']))
+    }
+
     /// Its cell of a capability.
     pub fn cell(&self, capability: &CapabilityId) -> Option<&CellCard> {
         self.cells.iter().find(|cell| cell.capability == *capability)
@@ -442,6 +503,10 @@ mod tests {
         assert_eq!(since, [Some("3.10.0"), Some("3.8.0"), Some("3.8.0"), None]);
         let changed: Vec<usize> = mitsuba.releases.iter().map(|r| r.changes.len()).collect();
         assert_eq!(changed, [1, 0, 1, 0]);
+        let Some(Since::Release { since, before }) = mitsuba.since(&mitsuba.releases[0].cells[0].capability) else {
+            panic!("{mitsuba:?}")
+        };
+        assert_eq!((since.as_str(), before.headline.as_str()), ("3.10.0", "wrong, up to 31 %"));
         let change = &mitsuba.releases[2].changes[0];
         assert_eq!(
             (change.before.as_str(), change.from.as_str(), change.to.as_str()),
@@ -465,6 +530,24 @@ mod tests {
             (middle.cells[0].since.as_ref(), newest.cells[0].since.as_ref().map(ReleaseLabel::as_str)),
             (None, Some("3.7.1"))
         );
+    }
+
+    #[test]
+    fn releases_of_one_program_version_differ_by_their_package() {
+        let mut reports = [release("radiance@1.0.0", "2026-03-01", 0.0), release("radiance", "2026-03-02", 0.0)];
+        let of_engines =
+            [("pyradiance-1.0.0, 6.0a", "pyradiance 1.0.0", None), ("6.0a", "pyradiance 1.3.1", Some("1.3.1"))];
+        for (report, (version, package, release)) in reports.iter_mut().zip(of_engines) {
+            let status = &mut report.engines[0];
+            status.version = Some(version.to_owned());
+            status.package = Some(package.to_owned());
+            status.release = release.map(str::to_owned);
+        }
+        let (cards, _) = cards(&reports).unwrap();
+        let texts: Vec<String> = cards.renderers[0].releases.iter().map(ReleaseCard::version_text).collect();
+        assert_eq!(texts, ["pyradiance 1.3.1, program 6.0a", "pyradiance 1.0.0, program 6.0a"]);
+        let cell = &cards.renderers[0].releases[0].cells[0].capability;
+        assert_eq!(cards.renderers[0].since(cell), Some(Since::All { releases: 2 }));
     }
 
     #[test]

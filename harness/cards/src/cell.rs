@@ -1,8 +1,10 @@
 //! The rule: evidence of cases to a cell of the matrix. The worst case counts.
 
 use std::collections::BTreeSet;
+use std::fmt;
 
 use itertools::Itertools;
+use luxproof_model::FailureKind;
 use luxproof_model::numbers::plural;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,20 +40,27 @@ pub enum Standing {
     /// Every point of every case passes.
     Accurate {
         /// The deviation with the largest bound; null where no reference is above zero.
-        worst: Option<Deviation>,
+        worst: Option<WorstPoint>,
     },
     /// It is right within limits, or not decided.
     Limited {
         what: String,
         /// Where: cases and points.
         from: String,
-        worst: Option<Deviation>,
+        worst: Option<WorstPoint>,
     },
     /// One point is enough.
     Wrong {
         fault: String,
         from: String,
-        worst: Option<Deviation>,
+        worst: Option<WorstPoint>,
+    },
+    /// It gives no values where it should: it crashes, gives no answer in time, or an unreadable one.
+    Failed {
+        failure: FailureKind,
+        reason: String,
+        from: String,
+        at: Place,
     },
     NotSupported {
         reason: String,
@@ -61,11 +70,73 @@ pub enum Standing {
     },
 }
 
+/// Where the worst of a cell was found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Place {
+    /// The public case; of a hidden variant the case that it is drawn from.
+    pub case: String,
+    /// Null for a public case.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// Null where no single point shows it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub meter: Option<String>,
+}
+
+impl Place {
+    fn of(evidence: &CaseEvidence, meter: Option<String>) -> Self {
+        Self { case: evidence.case.clone(), seed: evidence.hidden.as_ref().map(|variant| variant.seed), meter }
+    }
+
+    /// The case in one or two words.
+    pub fn case_text(&self) -> String {
+        match self.seed {
+            Some(_) => format!("{}, hidden", self.case),
+            None => self.case.clone(),
+        }
+    }
+}
+
+/// `floor[1] of cie-5.2 (hidden, seed 7)`.
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(meter) = &self.meter {
+            write!(f, "{meter} of ")?;
+        }
+        f.write_str(&self.case)?;
+        self.seed.map_or(Ok(()), |seed| write!(f, " (hidden, seed {seed})"))
+    }
+}
+
+/// A deviation and where it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorstPoint {
+    pub deviation: Deviation,
+    pub at: Place,
+}
+
+/// How an engine fails, in one or two words.
+const fn failure_words(failure: FailureKind) -> &'static str {
+    match failure {
+        FailureKind::Crash => "crashes",
+        FailureKind::Hang => "no answer in time",
+        FailureKind::Garbled => "unreadable output",
+        FailureKind::SilentLoss => "values missing",
+        FailureKind::Nan => "not a number",
+        FailureKind::ErrorExit => "ends with an error",
+        FailureKind::Declined
+        | FailureKind::Refused
+        | FailureKind::Interrupted
+        | FailureKind::TimeUp
+        | FailureKind::Unread => "fails",
+    }
+}
+
 /// The largest bounds of public cases and of their hidden variants.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Spread {
-    pub public: Option<Deviation>,
-    pub hidden: Option<Deviation>,
+    pub public: Option<WorstPoint>,
+    pub hidden: Option<WorstPoint>,
     /// The seeds of the hidden variants.
     pub seeds: Vec<u64>,
     /// Whether no public case shows a fault, and a variant of one that is right does.
@@ -79,6 +150,7 @@ impl Standing {
             Self::Accurate { .. } => "accurate",
             Self::Limited { .. } => "limited",
             Self::Wrong { .. } => "wrong",
+            Self::Failed { .. } => "fails",
             Self::NotSupported { .. } => "not supported",
             Self::NotTested { .. } => "not tested",
         }
@@ -90,6 +162,7 @@ impl Standing {
             Self::Accurate { .. } => "accurate",
             Self::Limited { .. } => "limited",
             Self::Wrong { .. } => "wrong",
+            Self::Failed { .. } => "failed",
             Self::NotSupported { .. } => "unsupported",
             Self::NotTested { .. } => "untested",
         }
@@ -101,6 +174,7 @@ impl Standing {
             Self::Accurate { .. } => "✓",
             Self::Limited { .. } => "≈",
             Self::Wrong { .. } => "✕",
+            Self::Failed { .. } => "!",
             Self::NotSupported { .. } => "–",
             Self::NotTested { .. } => "·",
         }
@@ -112,23 +186,33 @@ impl Standing {
     }
 
     /// The deviation with the largest bound behind it.
-    pub const fn worst(&self) -> Option<Deviation> {
+    pub fn worst(&self) -> Option<Deviation> {
+        self.worst_point().map(|worst| worst.deviation)
+    }
+
+    const fn worst_point(&self) -> Option<&WorstPoint> {
         match self {
-            Self::Accurate { worst } | Self::Limited { worst, .. } | Self::Wrong { worst, .. } => *worst,
-            Self::NotSupported { .. } | Self::NotTested { .. } => None,
+            Self::Accurate { worst } | Self::Limited { worst, .. } | Self::Wrong { worst, .. } => worst.as_ref(),
+            Self::Failed { .. } | Self::NotSupported { .. } | Self::NotTested { .. } => None,
         }
     }
 
-    /// The cell in a few words: `within 0.84 %`, `wrong, up to 12 %`, `not tested`.
-    pub fn headline(&self) -> String {
+    /// Where its worst is.
+    pub fn place(&self) -> Option<&Place> {
         match self {
-            Self::Accurate { worst: Some(worst) } => format!("within {}", worst.bound_text()),
-            Self::Accurate { worst: None } => "accurate".to_owned(),
-            Self::Limited { worst: Some(worst), .. } => format!("limited, up to {}", worst.bound_text()),
-            Self::Wrong { worst: Some(worst), .. } => format!("wrong, up to {}", worst.bound_text()),
-            Self::Limited { .. } | Self::Wrong { .. } | Self::NotSupported { .. } | Self::NotTested { .. } => {
-                self.word().to_owned()
-            }
+            Self::Failed { at, .. } => Some(at),
+            other => other.worst_point().map(|worst| &worst.at),
+        }
+    }
+
+    /// The cell in a few words: `within 0.84 %`, `wrong, up to 12 %`, `crashes`, `not tested`.
+    pub fn headline(&self) -> String {
+        let bound = self.worst().map(|worst| worst.bound_text());
+        match (self, bound) {
+            (Self::Accurate { .. }, Some(bound)) => format!("within {bound}"),
+            (Self::Limited { .. } | Self::Wrong { .. }, Some(bound)) => format!("{}, up to {bound}", self.word()),
+            (Self::Failed { failure, .. }, _) => failure_words(*failure).to_owned(),
+            _ => self.word().to_owned(),
         }
     }
 
@@ -136,12 +220,12 @@ impl Standing {
     pub fn explanation(&self) -> String {
         match self {
             Self::Accurate { worst: Some(worst) } => {
-                format!("every point of every case passes; the worst deviates by {worst}")
+                format!("every point of every case passes; the worst deviates by {}, at {}", worst.deviation, worst.at)
             }
             Self::Accurate { worst: None } => "every point of every case passes".to_owned(),
-            Self::Limited { what: text, from, .. } | Self::Wrong { fault: text, from, .. } => {
-                format!("{text} ({from})")
-            }
+            Self::Limited { what: text, from, .. }
+            | Self::Wrong { fault: text, from, .. }
+            | Self::Failed { reason: text, from, .. } => format!("{text} ({from})"),
             Self::NotSupported { reason } | Self::NotTested { reason } => reason.clone(),
         }
     }
@@ -149,8 +233,9 @@ impl Standing {
 
 /// The cell of a capability by the evidence of one release, public and hidden.
 ///
-/// Faults come first: one is enough, in whatever case. Then too few cases are `not tested`. Everything that is neither a pass nor a
-/// fault limits the cell. Only what passes everywhere is accurate.
+/// Faults come first: one is enough, in whatever case. Then come cases without values, which are no wrong light but no answer either.
+/// Then too few cases are `not tested`. Everything that is neither a pass nor a fault limits the cell. Only what passes everywhere is
+/// accurate.
 pub fn judge(capability: &Capability, evidence: &[CaseEvidence]) -> Cell {
     let (public, hidden): (Vec<_>, Vec<_>) = evidence.iter().partition(|e| e.hidden.is_none());
     let tested: BTreeSet<&str> = public.iter().filter(|e| e.measurement().is_some()).map(|e| e.case.as_str()).collect();
@@ -159,6 +244,7 @@ pub fn judge(capability: &Capability, evidence: &[CaseEvidence]) -> Cell {
     let missing: Vec<String> = named.filter(|case| !is_there(case)).map(str::to_owned).collect();
     let spread = spread(&public, &hidden);
     let standing = wrong(evidence, spread.as_ref())
+        .or_else(|| without_answer(evidence, spread.as_ref()))
         .or_else(|| without_values(capability, &public, tested.len(), &missing))
         .or_else(|| limited(evidence))
         .unwrap_or_else(|| Standing::Accurate { worst: worst_of(evidence.iter()) });
@@ -173,39 +259,6 @@ pub fn judge(capability: &Capability, evidence: &[CaseEvidence]) -> Cell {
     }
 }
 
-/// How much larger than that of the public case the bound of a hidden variant may be with the same cause.
-const SAME_CAUSE_FACTOR: f64 = 2.0;
-
-/// Gives hidden variants the known limits of their public case.
-///
-/// Known deviations are on record by content, so that none is about a variant. Where a limit of the method explains the public case,
-/// a variant that deviates in the same size shows the same limit, and no fault that the public case lacks.
-pub(crate) fn inherit_limits(evidence: &mut [CaseEvidence]) {
-    let public = evidence.iter().filter(|e| e.hidden.is_none() && e.faults().is_empty());
-    let limits = public.flat_map(|e| {
-        let named = e.limits().into_iter().filter(|limit| !limit.text.is_empty());
-        named.map(|limit| (e.case.clone(), e.procedure, limit.text.clone(), limit.bound()))
-    });
-    let limits = limits.into_group_map_by(|(case, procedure, ..)| (case.clone(), *procedure));
-    for variant in evidence.iter_mut().filter(|e| e.hidden.is_some()) {
-        let (case, procedure) = (variant.case.clone(), variant.procedure);
-        let Outcome::Measured(measurement) = &mut variant.outcome else { continue };
-        for remark in &mut measurement.remarks {
-            let Remark::Fault { points, worst: Some(worst), at, .. } = remark else { continue };
-            let mut known = limits.get(&(case.clone(), procedure)).into_iter().flatten();
-            let known = known.find(|(_, _, _, bound)| worst.bound() <= SAME_CAUSE_FACTOR * bound);
-            if let Some((_, _, text, _)) = known {
-                *remark = Remark::Limit {
-                    text: format!("as in the public case: {text}"),
-                    points: *points,
-                    worst: Some(*worst),
-                    at: at.clone(),
-                };
-            }
-        }
-    }
-}
-
 impl CaseEvidence {
     /// Its values, where there are any.
     pub const fn measurement(&self) -> Option<&Measurement> {
@@ -215,18 +268,21 @@ impl CaseEvidence {
         }
     }
 
-    /// The faults that it shows: text, worst deviation and place.
+    /// The faults that its values show: text, worst deviation and place.
     fn faults(&self) -> Vec<Flaw<'_>> {
-        match &self.outcome {
-            Outcome::Failed { reason } => {
-                vec![Flaw { case: self, text: format!("it fails: {reason}"), worst: None, at: None }]
-            }
-            Outcome::Measured(measurement) => {
-                let remarks = measurement.remarks.iter();
-                remarks.filter_map(|remark| Flaw::of_fault(self, remark)).collect()
-            }
-            Outcome::Unsupported { .. } | Outcome::NotRun { .. } => vec![],
-        }
+        let remarks = self.measurement().into_iter().flat_map(|measurement| &measurement.remarks);
+        remarks.filter_map(|remark| Flaw::of_fault(self, remark)).collect()
+    }
+
+    /// Whether it gives wrong values, or none where it should.
+    fn is_faulty(&self) -> bool {
+        !self.faults().is_empty() || self.failure().is_some()
+    }
+
+    /// How it fails, where it does.
+    fn failure(&self) -> Option<(FailureKind, Flaw<'_>)> {
+        let Outcome::Failed { failure, reason } = &self.outcome else { return None };
+        Some((*failure, Flaw { case: self, text: reason.clone(), worst: None, at: None }))
     }
 
     /// What limits it.
@@ -272,6 +328,14 @@ impl<'a> Flaw<'a> {
     fn bound(&self) -> f64 {
         self.worst.map_or(0.0, |worst| worst.bound())
     }
+
+    fn place(&self) -> Place {
+        Place::of(self.case, self.at.clone())
+    }
+
+    fn worst_point(&self) -> Option<WorstPoint> {
+        Some(WorstPoint { deviation: self.worst?, at: self.place() })
+    }
 }
 
 /// The flaw with the largest bound, and where all of them are.
@@ -292,27 +356,47 @@ fn gravest<'a>(flaws: Vec<Flaw<'a>>, evidence: &[CaseEvidence]) -> Option<(Flaw<
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let count = cases.len();
     let worst = flaws.into_iter().nth(worst?)?;
-    let at = worst.at.as_ref().map(|at| format!("; worst at {at} of {}", place(worst.case))).unwrap_or_default();
+    let at = worst.at.as_ref().map(|_| format!("; worst at {}", worst.place())).unwrap_or_default();
     Some((worst, format!("in {count} of {}: {listed}{more}{variants}{at}", plural(run, "case"))))
-}
-
-/// The name of a case; a hidden variant says so.
-fn place(evidence: &CaseEvidence) -> String {
-    match &evidence.hidden {
-        Some(variant) => format!("{} (hidden, seed {})", evidence.case, variant.seed),
-        None => evidence.case.clone(),
-    }
 }
 
 fn wrong(evidence: &[CaseEvidence], spread: Option<&Spread>) -> Option<Standing> {
     let faults = evidence.iter().flat_map(CaseEvidence::faults).collect();
     let (worst, from) = gravest(faults, evidence)?;
+    let point = worst.worst_point();
     let fault = if spread.is_some_and(|spread| spread.is_public_only) {
         format!("right in the public cases only, wrong in their hidden variants: {}", worst.text)
     } else {
-        worst.text
+        match public_limit(worst.case, evidence) {
+            Some(limit) => format!("{}; the known limit of the public case does not cover it: {limit}", worst.text),
+            None => worst.text,
+        }
     };
-    Some(Standing::Wrong { fault, from, worst: worst.worst })
+    Some(Standing::Wrong { fault, from, worst: point })
+}
+
+/// The known limit of the public case of a hidden variant. It counts for the case that declares it and for no other.
+fn public_limit(variant: &CaseEvidence, evidence: &[CaseEvidence]) -> Option<String> {
+    variant.hidden.as_ref()?;
+    let mut public =
+        evidence.iter().filter(|e| e.hidden.is_none() && e.case == variant.case && e.procedure == variant.procedure);
+    public.find_map(|e| e.limits().into_iter().map(|limit| limit.text).find(|text| !text.is_empty()))
+}
+
+/// A cell with cases that give no values and are not refused either.
+fn without_answer(evidence: &[CaseEvidence], spread: Option<&Spread>) -> Option<Standing> {
+    let (kinds, flaws): (Vec<FailureKind>, Vec<Flaw<'_>>) = evidence.iter().filter_map(CaseEvidence::failure).unzip();
+    let failure = *kinds.first()?;
+    // All that fail the same way, and where.
+    let same = kinds.iter().zip(flaws).filter(|(kind, _)| **kind == failure).map(|(_, flaw)| flaw).collect();
+    let (flaw, from) = gravest(same, evidence)?;
+    let at = flaw.place();
+    let reason = if spread.is_some_and(|spread| spread.is_public_only) {
+        format!("right in the public cases only, fails in their hidden variants: {}", flaw.text)
+    } else {
+        flaw.text
+    };
+    Some(Standing::Failed { failure, reason, from, at })
 }
 
 /// A cell with too few values for a claim.
@@ -358,7 +442,8 @@ fn limited(evidence: &[CaseEvidence]) -> Option<Standing> {
     let (what, from) = match gravest(named, evidence) {
         // Where it declines there is no deviation: a bound would say something about other cases.
         Some((worst, from)) if worst.worst.is_none() && undecided.is_none() => {
-            let elsewhere = worst_of(evidence.iter()).map(|worst| format!("; elsewhere within {}", worst.bound_text()));
+            let elsewhere =
+                worst_of(evidence.iter()).map(|worst| format!("; elsewhere within {}", worst.deviation.bound_text()));
             return Some(Standing::Limited {
                 what: worst.text,
                 from: from + &elsewhere.unwrap_or_default(),
@@ -371,10 +456,14 @@ fn limited(evidence: &[CaseEvidence]) -> Option<Standing> {
     Some(Standing::Limited { what, from, worst: worst_of(evidence.iter()) })
 }
 
-/// The deviation with the largest bound.
-fn worst_of<'a>(evidence: impl Iterator<Item = &'a CaseEvidence>) -> Option<Deviation> {
-    let all = evidence.filter_map(CaseEvidence::measurement).filter_map(|m| m.worst);
-    all.max_by(|a, b| a.bound().total_cmp(&b.bound()))
+/// The deviation with the largest bound, and where it is.
+fn worst_of<'a>(evidence: impl Iterator<Item = &'a CaseEvidence>) -> Option<WorstPoint> {
+    let all = evidence.filter_map(|e| Some((e, e.measurement()?)));
+    let all = all.filter_map(|(e, measurement)| {
+        let meter = measurement.points.first().map(|point| point.meter.clone());
+        Some(WorstPoint { deviation: measurement.worst?, at: Place::of(e, meter) })
+    });
+    all.max_by(|a, b| a.deviation.bound().total_cmp(&b.deviation.bound()))
 }
 
 /// Public against hidden cases, of the same procedures; `None` without hidden ones.
@@ -385,18 +474,19 @@ fn spread(public: &[&CaseEvidence], hidden: &[&CaseEvidence]) -> Option<Spread> 
     }
     let is_varied = |e: &&&CaseEvidence| hidden.iter().any(|h| h.case == e.case && h.procedure == e.procedure);
     let paired: Vec<&CaseEvidence> = public.iter().filter(is_varied).copied().collect();
-    let is_spotless = |e: &&CaseEvidence| e.measurement().is_some() && e.faults().is_empty() && e.limits().is_empty();
-    let is_exposed = |e: &CaseEvidence| {
-        let of_public = paired.iter().copied().filter(|p| p.case == e.case && p.procedure == e.procedure);
-        !e.faults().is_empty() && of_public.into_iter().any(|p| is_spotless(&p))
-    };
-    let has_public_fault = public.iter().any(|e| !e.faults().is_empty());
+    let has_public_fault = public.iter().any(|e| e.is_faulty());
     Some(Spread {
         public: worst_of(paired.iter().copied()),
         hidden: worst_of(hidden.iter().copied()),
         seeds: seeds.into_iter().collect(),
-        is_public_only: !has_public_fault && hidden.iter().any(|e| is_exposed(e)),
+        is_public_only: !has_public_fault && hidden.iter().any(|e| is_exposed(e, &paired)),
     })
+}
+
+/// Whether a hidden variant shows a fault, and its public case nothing.
+fn is_exposed(variant: &CaseEvidence, public: &[&CaseEvidence]) -> bool {
+    let mut of_public = public.iter().filter(|e| e.case == variant.case && e.procedure == variant.procedure);
+    variant.is_faulty() && of_public.any(|e| e.measurement().is_some() && !e.is_faulty() && e.limits().is_empty())
 }
 
 #[cfg(test)]
@@ -449,7 +539,8 @@ mod tests {
         let many = (0..99).fold(MadeCase::new("a"), |given, _| given.off(0.0, 0.0001));
         let found = cell(&three(many.off(0.05, 0.001)), 3);
         let Standing::Wrong { from, worst, .. } = &found.standing else { panic!("{found:?}") };
-        assert_eq!(worst.map(|d| d.value), Some(0.05));
+        assert_eq!(worst.as_ref().map(|w| w.deviation.value), Some(0.05));
+        assert_eq!(found.standing.place().unwrap().to_string(), "floor[99] of a");
         assert!(from.contains("in 1 of 3 cases: a") && from.contains("floor[99] of a"), "{from}");
     }
 
@@ -520,7 +611,7 @@ mod tests {
             (what.as_str(), from.as_str()),
             ("20 reflections at most", "in 1 of 3 cases: a; worst at floor[0] of a")
         );
-        assert!((worst.unwrap().bound() - 0.121).abs() < 1e-12);
+        assert!((worst.as_ref().unwrap().deviation.bound() - 0.121).abs() < 1e-12);
         let wrong = cell_of(&known("fault"), 3);
         let Standing::Wrong { fault, .. } = &wrong.standing else { panic!("{wrong:?}") };
         assert_eq!(fault, "20 reflections at most");
@@ -539,7 +630,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_engine_declines_is_not_supported_and_a_crash_is_a_fault() {
+    fn what_an_engine_declines_is_not_supported_and_a_crash_is_a_failure() {
         let all = ["a", "b", "c"].map(|case| MadeCase::new(case).unsupported());
         assert_eq!(cell(&all, 2).standing, Standing::NotSupported { reason: "only boxes".to_owned() });
         let some =
@@ -550,9 +641,12 @@ mod tests {
         assert_eq!(from, "in 1 of 3 cases: c; elsewhere within 0.0001 %");
         assert_eq!(found.standing.headline(), "limited");
         let crash = cell(&three(MadeCase::new("a").failing("crash", "signal 11")), 2);
-        assert!(crash.standing.explanation().starts_with("it fails: signal 11"), "{crash:?}");
+        assert_eq!(crash.standing.headline(), "crashes");
+        assert_eq!(crash.standing.explanation(), "signal 11 (in 1 of 3 cases: a)");
         let declined = cell(&three(MadeCase::new("a").failing("declined", "no bodies")), 2);
         assert!(matches!(declined.standing, Standing::Limited { .. }), "{declined:?}");
+        let refused = cell(&three(MadeCase::new("a").failing("refused", "no such setting")), 2);
+        assert!(matches!(refused.standing, Standing::Limited { .. }), "{refused:?}");
         // What had no time says nothing about the engine.
         let late = cell(&three(MadeCase::new("a").failing("time_up", "no time was left")), 3);
         assert!(matches!(late.standing, Standing::NotTested { .. }), "{late:?}");
@@ -571,15 +665,18 @@ mod tests {
         assert!(reason.contains("luxproof reads it"), "{reason}");
         report.recordings.iter_mut().for_each(|recording| recording.reads_files = true);
         assert!(matches!(judged(&report), Standing::Accurate { .. }));
-        // A file that it rejects gives no wrong light; the place of its log is not published.
+        // A file that it rejects with a reason is not supported; the place of its log is not published.
         for recording in &mut report.recordings {
             recording.failure =
                 Some("ies2rad failed:   - /home/me/lib.so\n  - /home/me/b.so\nunsupported type\nall its messages are in /home/me/log".to_owned());
-            recording.failure_kind = Some(luxproof_model::FailureKind::Crash);
+            recording.failure_kind = Some(FailureKind::ErrorExit);
         }
         let rejected =
             Standing::NotSupported { reason: "it does not read the file: ies2rad failed; unsupported type".to_owned() };
         assert_eq!(judged(&report), rejected);
+        // A parser that crashes on a file refuses nothing.
+        report.recordings.iter_mut().for_each(|recording| recording.failure_kind = Some(FailureKind::Crash));
+        assert_eq!(judged(&report).headline(), "crashes");
     }
 
     #[test]
@@ -606,28 +703,58 @@ mod tests {
         let spread = found.spread.unwrap();
         assert!(spread.is_public_only);
         assert_eq!(spread.seeds, [7]);
-        assert_eq!(spread.public.map(|d| d.value), Some(0.0));
-        assert_eq!(spread.hidden.map(|d| (d.value, d.measure)), Some((0.05, Measure::Relative)));
+        assert_eq!(spread.public.map(|w| w.deviation.value), Some(0.0));
+        let worst = spread.hidden.unwrap();
+        assert_eq!((worst.deviation.value, worst.deviation.measure), (0.05, Measure::Relative));
+        assert_eq!(worst.at.to_string(), "floor[0] of a (hidden, seed 7)");
         assert_eq!((found.tested_cases, found.hidden_variants), (3, 1));
     }
 
     #[test]
-    fn a_limit_of_a_public_case_explains_its_variant_if_that_deviates_no_more_than_twice_as_much() {
-        for (off, is_limited) in [(-0.15, true), (-0.5, false)] {
-            let mut report = known("limit");
-            let with_variant =
-                super::super::fixtures::report(ENGINE, "1.0", &[MadeCase::new("a").hidden(7).off(off, 0.001)]);
-            report.cases.extend(with_variant.cases);
-            report.recordings.extend(with_variant.recordings);
-            report.comparisons.extend(with_variant.comparisons);
-            let capabilities = capabilities(3);
-            let mut evidence = evidence_of(&report, &capabilities);
-            inherit_limits(&mut evidence);
-            let found = judge(&capabilities.capabilities[0], &evidence);
-            assert_eq!(matches!(found.standing, Standing::Limited { .. }), is_limited, "{found:?}");
-            // The public case is not right, so nothing is tuned to it.
-            assert!(!found.spread.unwrap().is_public_only);
+    fn every_way_to_give_no_values_has_its_words_and_is_never_not_supported() {
+        for (kind, words) in [
+            ("crash", "crashes"),
+            ("hang", "no answer in time"),
+            ("garbled", "unreadable output"),
+            ("silent_loss", "values missing"),
+            ("nan", "not a number"),
+            ("error_exit", "ends with an error"),
+        ] {
+            let all = ["a", "b", "c"].map(|case| MadeCase::new(case).failing(kind, "why"));
+            let found = cell(&all, 2);
+            assert!(matches!(found.standing, Standing::Failed { .. }), "{kind}: {found:?}");
+            assert_eq!(found.standing.headline(), words);
         }
+        // Wrong light is worse than none.
+        let both = [MadeCase::new("a").off(0.5, 0.0), MadeCase::new("b").failing("crash", "signal 11")];
+        assert!(matches!(cell(&both, 1).standing, Standing::Wrong { .. }));
+    }
+
+    #[test]
+    fn a_known_limit_covers_its_own_case_and_no_hidden_variant() {
+        let mut report = known("limit");
+        let with_variant =
+            super::super::fixtures::report(ENGINE, "1.0", &[MadeCase::new("a").hidden(7).off(-0.15, 0.001)]);
+        report.cases.extend(with_variant.cases);
+        report.recordings.extend(with_variant.recordings);
+        report.comparisons.extend(with_variant.comparisons);
+        let found = cell_of(&report, 3);
+        let Standing::Wrong { fault, .. } = &found.standing else { panic!("{found:?}") };
+        assert_eq!(
+            fault,
+            "no known cause; the known limit of the public case does not cover it: 20 reflections at most"
+        );
+        // The public case is not right, so nothing is tuned to it.
+        assert!(!found.spread.unwrap().is_public_only);
+    }
+
+    #[test]
+    fn a_crash_in_hidden_variants_alone_shows_tuning_too() {
+        let hidden = MadeCase::new("a").hidden(7).failing("crash", "signal 11");
+        let found = cell(&[&three(MadeCase::new("a").off(0.0, 0.001))[..], &[hidden]].concat(), 3);
+        assert!(found.spread.as_ref().unwrap().is_public_only);
+        assert!(found.standing.explanation().starts_with("right in the public cases only, fails"), "{found:?}");
+        assert_eq!(found.standing.place().unwrap().to_string(), "a (hidden, seed 7)");
     }
 
     #[test]

@@ -36,9 +36,9 @@ pub struct CaseEvidence {
     pub engine: EngineName,
     /// Hash of what was measured, independent of names.
     pub content_sha256: String,
-    /// The command that repeats the values by hand, where there is one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub command: Option<String>,
+    /// Whether `luxproof export` writes a scene of it, with the command that runs it by hand.
+    #[serde(default)]
+    pub is_exportable: bool,
     pub outcome: Outcome,
 }
 
@@ -55,8 +55,9 @@ pub enum Outcome {
     NotRun {
         reason: String,
     },
-    /// The engine gave no usable values.
+    /// The engine gave no usable values, and did not refuse the case either.
     Failed {
+        failure: FailureKind,
         reason: String,
     },
 }
@@ -198,7 +199,7 @@ impl<'a> ReportIndex<'a> {
             run: run.clone(),
             engine: engine.clone(),
             content_sha256: recording.map(|r| r.content_sha256.clone()).unwrap_or_default(),
-            command: recording.and_then(|r| r.command.clone()),
+            is_exportable: recording.is_some_and(|r| r.command.is_some()) && !record.is_calibration,
             outcome,
         })
     }
@@ -302,15 +303,25 @@ impl<'a> ReportIndex<'a> {
 }
 
 /// The outcome of a job without usable values.
+///
+/// An engine that refuses the job and says why does not support it. A parser that ends with an error and a message refuses its file.
+/// Whatever else gives no values fails: a user learns nothing from a crash.
 fn failed(kind: Option<FailureKind>, reason: String, capability: &Capability) -> Outcome {
+    // Reports of older versions name no kind.
+    let kind = kind.unwrap_or(FailureKind::Crash);
     match kind {
-        Some(FailureKind::Declined) => Outcome::Unsupported { reason },
-        Some(kind) if !kind.is_an_answer() => Outcome::NotRun { reason },
-        // It said so: a user gets no wrong light.
-        Some(FailureKind::Crash | FailureKind::Refused) if capability.reads_files => {
+        FailureKind::Declined => Outcome::Unsupported { reason },
+        FailureKind::Interrupted | FailureKind::TimeUp | FailureKind::Unread => Outcome::NotRun { reason },
+        FailureKind::Refused | FailureKind::ErrorExit if capability.reads_files => {
             Outcome::Unsupported { reason: format!("it does not read the file: {reason}") }
         }
-        _ => Outcome::Failed { reason },
+        FailureKind::Refused => Outcome::Unsupported { reason: format!("it refuses the case: {reason}") },
+        FailureKind::ErrorExit
+        | FailureKind::Crash
+        | FailureKind::Hang
+        | FailureKind::Nan
+        | FailureKind::SilentLoss
+        | FailureKind::Garbled => Outcome::Failed { failure: kind, reason },
     }
 }
 

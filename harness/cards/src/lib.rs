@@ -20,10 +20,11 @@ mod fixtures;
 
 pub use capabilities::{Capabilities, Capability, CapabilityId, CaseSelector, EXAMPLE_FILE};
 pub use cards::{
-    CardRun, Cards, CellCard, CellEvidence, Change, ReleaseCard, ReleaseEvidence, RendererCard, RunId, Verification,
+    CardRun, Cards, CellCard, CellEvidence, Change, ReleaseCard, ReleaseEvidence, RendererCard, RunId, Since,
+    Verification,
 };
 pub use case_difference::{CaseDifference, compare_cases};
-pub use cell::{Cell, Spread, Standing, judge};
+pub use cell::{Cell, Place, Spread, Standing, WorstPoint, judge};
 pub use deviation::{Deviation, Measure};
 pub use error::CardsError;
 pub use evidence::{CaseEvidence, Measurement, Outcome, PointEvidence, Remark, VerdictCounts};

@@ -9,8 +9,8 @@ use super::renderer_page::{crumb, crumb_link};
 use super::{frame, plot, sign};
 use crate::cards::anchor;
 use crate::{
-    Capability, CardRun, Cards, CaseEvidence, CellEvidence, Deviation, Measurement, Outcome, ReleaseEvidence, Remark,
-    Spread, Verification,
+    Capability, CardRun, Cards, CaseEvidence, CellEvidence, Measurement, Outcome, ReleaseEvidence, Remark, Spread,
+    Verification, WorstPoint,
 };
 
 const ROOT: &str = "../../";
@@ -33,7 +33,7 @@ pub(super) fn page(cards: &Cards, capability: &Capability, of: &CellEvidence) ->
                 }
             }
         }
-        @for (k, release) in of.releases.iter().enumerate() { (release_section(cards, release, k == 0)) }
+        @for (k, release) in of.releases.iter().enumerate() { (release_section(cards, &of.renderer, release, k == 0)) }
         p.where { "The same as JSON: " a href={ (capability.id) ".json" } { code { (capability.id) ".json" } } }
     };
     let link = crumb_link(&of.renderer_slug);
@@ -44,12 +44,21 @@ pub(super) fn page(cards: &Cards, capability: &Capability, of: &CellEvidence) ->
 const SCRIPT: &str = "const reveal=()=>{const s=document.getElementById(decodeURIComponent(location.hash.slice(1)));\
 const d=s&&s.querySelector('details');if(d){d.open=true;s.scrollIntoView()}};addEventListener('hashchange',reveal);reveal();";
 
-fn release_section(cards: &Cards, release: &ReleaseEvidence, is_newest: bool) -> Markup {
+/// The version of a release, where it says more than its name.
+fn version_text(cards: &Cards, renderer: &str, release: &ReleaseEvidence) -> Option<String> {
+    let card = cards.renderers.iter().find(|card| card.name == renderer)?;
+    let card = card.releases.iter().find(|card| card.release == release.release)?;
+    Some(card.version_text()).filter(|text| !text.is_empty())
+}
+
+fn release_section(cards: &Cards, renderer: &str, release: &ReleaseEvidence, is_newest: bool) -> Markup {
     let standing = &release.cell.standing;
+    let version = version_text(cards, renderer, release);
     html! {
         section.evidence id=(anchor(&release.release)) {
             h2 class={ "s-" (standing.key()) } { (release.release) ": " span.badge { (sign(standing)) " " (standing.headline()) } }
             p.lead { (minus(&standing.explanation())) }
+            @if let Some(version) = version { p.where { "Version: " (version) } }
             p.where {
                 (release.cell.tested_cases) " of " (plural(release.cell.all_cases, "case")) ", "
                 (plural(release.cell.hidden_variants, "hidden variant")) ", " (plural(release.cell.points, "comparison"))
@@ -63,8 +72,8 @@ fn release_section(cards: &Cards, release: &ReleaseEvidence, is_newest: bool) ->
                     (plot::deviations(&release.cases))
                     (case_table(release))
                     details {
-                        summary { "Worst points, case by case" }
-                        @for case in &release.cases { (points(release, case)) }
+                        summary { "Worst points and scenes, case by case" }
+                        @for case in &release.cases { (points(cards, release, case)) }
                     }
                     (repeat(cards, release))
                 }
@@ -84,8 +93,11 @@ fn spread_line(spread: &Spread) -> Markup {
 }
 
 /// The bound of a deviation, where there is one.
-fn bound(deviation: Option<&Deviation>) -> String {
-    deviation.map_or_else(|| "nothing measured".to_owned(), |deviation| format!("within {}", deviation.bound_text()))
+fn bound(worst: Option<&WorstPoint>) -> String {
+    worst.map_or_else(
+        || "nothing measured".to_owned(),
+        |worst| format!("within {}, worst at {}", worst.deviation.bound_text(), worst.at),
+    )
 }
 
 fn case_table(release: &ReleaseEvidence) -> Markup {
@@ -120,7 +132,7 @@ fn outcome_cells(case: &CaseEvidence) -> Markup {
             }
             Outcome::Unsupported { reason } => { td.number { "0" } td.number { "–" } td { "declined: " (reason) } }
             Outcome::NotRun { reason } => { td.number { "0" } td.number { "–" } td { "not run: " (reason) } }
-            Outcome::Failed { reason } => { td.number { "0" } td.number { "–" } td.bad { "failed: " (reason) } }
+            Outcome::Failed { reason, .. } => { td.number { "0" } td.number { "–" } td.bad { "failed: " (reason) } }
         }
     }
 }
@@ -140,18 +152,21 @@ fn result(measurement: &Measurement) -> Markup {
     }
 }
 
-/// The points of a case with the largest bounds, and the command behind them.
-fn points(release: &ReleaseEvidence, case: &CaseEvidence) -> Markup {
+/// The points of a case with the largest bounds, and the command that runs it by hand.
+fn points(cards: &Cards, release: &ReleaseEvidence, case: &CaseEvidence) -> Markup {
     const HEADS: [&str; 6] =
         ["point", "number value", "number reference", "number deviation", "verdict", "reference by"];
-    let Outcome::Measured(measurement) = &case.outcome else { return html! {} };
+    let points = case.measurement().map(|measurement| &measurement.points[..]).unwrap_or_default();
+    let command = cards.runs.iter().find(|run| run.id == case.run).and_then(|run| run.export_command(case));
     let hidden = case.hidden.as_ref().map(|variant| format!(" (hidden, seed {})", variant.seed)).unwrap_or_default();
     let label = format!("{}{hidden}, {}", case.case, case.procedure.title().to_lowercase());
     html! {
-        @if !measurement.points.is_empty() {
+        @if !points.is_empty() || command.is_some() {
             h3 { (label) }
+        }
+        @if !points.is_empty() {
             (table(&format!("{}: {label}, {}", release.release, case.reported_as), &HEADS, &html! {
-                @for point in &measurement.points {
+                @for point in points {
                     tr {
                         th scope="row" { (point.meter) }
                         td.number { (significant(point.value)) " " (point.unit) }
@@ -162,7 +177,10 @@ fn points(release: &ReleaseEvidence, case: &CaseEvidence) -> Markup {
                     }
                 }
             }))
-            @if let Some(command) = &case.command { p { "By hand:" } pre.commands tabindex="0" { code { (command) } } }
+        }
+        @if let Some(command) = command {
+            p { "By hand, in the unpacked bundle; this writes the scene and prints the command that runs it:" }
+            pre.commands tabindex="0" { code { (command) } }
         }
     }
 }
@@ -195,9 +213,19 @@ fn run_entry(run: &CardRun, release: &ReleaseEvidence) -> Markup {
             @if let Some(report) = &run.report { a href={ (ROOT) (report) } { "Full report with every point and plan" } ". " }
             @if let Some(bundle) = &run.bundle {
                 a href={ (ROOT) (bundle) } { "Bundle" } " with all inputs; "
-                code { "luxproof reproduce " (bundle.rsplit('/').next().unwrap_or(bundle)) } " repeats the whole run."
+                code { "luxproof reproduce " (file_name(bundle)) } " repeats the whole run and compares every value."
+            } @else {
+                "It has no bundle on this site."
             }
         }
-        @if let Some(command) = command { p { "These cases with this renderer:" } pre.commands tabindex="0" { code { (command) } } }
+        @if let Some(command) = command {
+            p { "These cases with this renderer, where the bundle lies:" }
+            pre.commands tabindex="0" { code { "unzip -q " (run.bundle.as_deref().map_or("bundle.zip", file_name)) " -d bundle && cd bundle\n" (command) } }
+        }
     }
+}
+
+/// The last part of a path on the site.
+fn file_name(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
 }

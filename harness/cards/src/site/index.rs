@@ -2,19 +2,23 @@
 
 use itertools::Itertools;
 use luxproof_model::numbers::plural;
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 
-use super::{frame, legend, shortened, sign};
+use super::releases::release_data;
+use super::{STATES, frame, hidden_page, legend, shortened, sign};
 use crate::cards::anchor;
-use crate::{Capability, Cards, CellCard, RendererCard, Standing};
+use crate::{Capability, Cards, CardsError, CellCard, RendererCard, Since, Standing};
 
 const SCRIPT: &str = include_str!("index.js");
 /// Letters of a fault that the matrix shows.
 const SHOWN_LETTERS: usize = 58;
+/// Letters of the name of a case that the matrix shows.
+const CASE_LETTERS: usize = 30;
 /// Changes that the first page lists.
 const LISTED_CHANGES: usize = 12;
 
-pub(super) fn page(cards: &Cards) -> Markup {
+pub(super) fn page(cards: &Cards) -> Result<Markup, CardsError> {
+    let data = release_data(cards)?;
     let releases: usize = cards.renderers.iter().map(|renderer| renderer.releases.len()).sum();
     let content = html! {
         header {
@@ -28,45 +32,30 @@ pub(super) fn page(cards: &Cards) -> Markup {
         }
         section aria-labelledby="matrix-title" {
             h2 id="matrix-title" { "Newest releases" }
-            (filters(cards))
+            (filters())
             (matrix(cards))
+            // Data, and no script: the browser runs nothing of it.
+            script id="releases" type="application/json" { (PreEscaped(data)) }
         }
         (hidden_variants(cards))
         (latest_changes(cards))
     };
-    frame(cards, "What each renderer can be trusted for", "", &[], &content, Some(SCRIPT))
+    Ok(frame(cards, "What each renderer can be trusted for", "", &[], &content, Some(SCRIPT)))
 }
 
-/// Search and filters, which work with the script only; the page does not need them.
-fn filters(cards: &Cards) -> Markup {
+/// Search and filters, which work with the script only; the page does not need them. The script fills the list of releases.
+fn filters() -> Markup {
     html! {
         div.filters role="search" {
             label { "Search " input id="search" type="search" placeholder="renderer or capability" autocomplete="off"; }
             label {
                 "Show " select id="state" {
                     option value="" { "every state" }
-                    option value="accurate" { "accurate" }
-                    option value="limited" { "limited" }
-                    option value="wrong" { "wrong" }
-                    option value="unsupported" { "not supported" }
-                    option value="untested" { "not tested" }
+                    @for (key, _, word, _) in STATES { option value=(key) { (word) } }
                 }
             }
-            label {
-                "Go to " select id="release" {
-                    option value="" { "a release" }
-                    @for renderer in &cards.renderers {
-                        optgroup label=(renderer.name) {
-                            @for release in &renderer.releases {
-                                option value={ "renderers/" (renderer.slug) "/index.html#" (anchor(&release.release)) } {
-                                    (renderer.name) " " (release.release)
-                                }
-                            }
-                        }
-                    }
-                }
-            }
-            output id="shown" for="search state" {}
+            label { "Releases " select id="release" { option value="" { "the newest of each" } } }
+            output id="shown" for="search state release" {}
         }
     }
 }
@@ -92,30 +81,23 @@ fn matrix(cards: &Cards) -> Markup {
     }
 }
 
-/// The renderer, its newest release, and the link to the others.
+/// The renderer, its newest release, and the button that unfolds the others.
 fn column_head(renderer: &RendererCard) -> Markup {
     let newest = renderer.releases.first();
     let label = newest.map(|release| release.release.as_str()).unwrap_or_default();
-    // Some releases have the number of a package, and their program another.
-    let other = newest.and_then(|release| release.versions.iter().find(|version| !version.contains(label)));
+    let package = newest.and_then(|release| release.packages.iter().next());
     html! {
         a href={ "renderers/" (renderer.slug) "/index.html" } { (renderer.name) }
-        span.release { (shortened(label, 16)) @if let Some(version) = other { " (" (shortened(version, 12)) ")" } }
-        @if renderer.releases.len() > 1 {
-            details {
-                summary { (renderer.releases.len()) " releases" }
-                ul.releases {
-                    @for release in &renderer.releases {
-                        li {
-                            a href={ "renderers/" (renderer.slug) "/index.html#" (anchor(&release.release)) } { (shortened(release.release.as_str(), 16)) }
-                            @if !release.changes.is_empty() { ", " (plural(release.changes.len(), "change")) }
-                        }
-                    }
-                }
-            }
+        span.release { (shortened(label, 16)) }
+        // The number of a package is not that of the program in it.
+        @if let Some(package) = package.filter(|package| !package.starts_with(&renderer.name)) {
+            span.release { (shortened(package, 24)) }
         }
         @if renderer.is_own { span.release { "luxproof's own" } }
-        @if renderer.releases.first().is_some_and(|release| release.is_recorded) { span.release { "recorded values" } }
+        @if newest.is_some_and(|release| release.is_recorded) { span.release { "recorded values" } }
+        @if renderer.releases.len() > 1 {
+            button.unfold type="button" aria-expanded="false" { (renderer.releases.len()) " releases" }
+        }
     }
 }
 
@@ -140,24 +122,37 @@ fn matrix_cell(renderer: &RendererCard, cell: &CellCard) -> Markup {
         td class={ "s-" (standing.key()) } data-renderer=(renderer.name) {
             a.cell href=(cell.page) {
                 (sign(standing)) " " (cell.headline.replace(" %", "\u{a0}%"))
-                @if let Standing::Wrong { fault: text, .. } | Standing::Limited { what: text, .. } | Standing::NotSupported { reason: text } = standing {
+                @if let Standing::Wrong { fault: text, .. } | Standing::Limited { what: text, .. } | Standing::Failed { reason: text, .. } | Standing::NotSupported { reason: text } = standing {
                     span.why { (shortened(first_clause(text), SHOWN_LETTERS)) }
                 }
-                @if let Some(since) = &cell.since { span.since { "since " (shortened(since.as_str(), 16)) } }
+                @if let Some(place) = standing.place() { span.since { "worst: " (shortened(&place.case_text(), CASE_LETTERS)) } }
+                @if let Some(since) = renderer.since(&cell.capability) { (since_line(since)) }
+            }
+        }
+    }
+}
+
+/// Since when a cell is what it is.
+fn since_line(since: Since<'_>) -> Markup {
+    html! {
+        span.since {
+            @match since {
+                Since::All { releases } => { "in all " (releases) " releases" }
+                Since::Release { since, before } => { "since " strong { (shortened(since.as_str(), 16)) } ", before: " (before.headline.replace(" %", "\u{a0}%")) }
             }
         }
     }
 }
 
 /// A text up to its evidence: diagnoses have it behind a colon.
-fn first_clause(text: &str) -> &str {
+pub(super) fn first_clause(text: &str) -> &str {
     /// A shorter clause says only that a cause follows.
     const SHORTEST: usize = 14;
     let clause = text.split_once(": ").map_or(text, |(clause, _)| clause);
     if clause.len() < SHORTEST { text } else { clause }
 }
 
-/// What hidden variants are, and their seeds.
+/// What hidden variants are, what they show, and their seeds.
 fn hidden_variants(cards: &Cards) -> Markup {
     html! {
         @if !cards.seeds.is_empty() {
@@ -168,6 +163,8 @@ fn hidden_variants(cards: &Cards) -> Markup {
                     "another room, other positions, another table. The worst of both counts. "
                     (if cards.seeds.len() == 1 { "Seed: " } else { "Seeds: " }) (cards.seeds.iter().join(", ")) "."
                 }
+                (hidden_page::tuned(cards))
+                p { a href=(hidden_page::FILE) { "Public cases against hidden variants, renderer by renderer" } }
             }
         }
     }

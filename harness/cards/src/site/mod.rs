@@ -5,8 +5,10 @@
 
 mod capability_page;
 mod evidence_page;
+mod hidden_page;
 mod index;
 mod plot;
+mod releases;
 mod renderer_page;
 #[cfg(test)]
 mod tests;
@@ -35,10 +37,13 @@ pub struct SiteFile {
 /// All pages with the JSON behind them; reports and bundles of runs are the caller's.
 pub fn files(cards: &Cards, evidence: &[CellEvidence]) -> Result<Vec<SiteFile>, CardsError> {
     let mut files = vec![
-        page("index.html", index::page(cards)),
+        page("index.html", index::page(cards)?),
         page("capabilities.html", capability_page::page(cards)),
         SiteFile { path: CARDS_FILE.to_owned(), content: serde_json::to_string(cards)? },
     ];
+    if !cards.seeds.is_empty() {
+        files.push(page(hidden_page::FILE, hidden_page::page(cards)));
+    }
     for renderer in &cards.renderers {
         files.push(page(&format!("renderers/{}/index.html", renderer.slug), renderer_page::page(cards, renderer)));
     }
@@ -80,7 +85,7 @@ fn frame(
                 meta name="generator" content=(format!("luxproof {}", cards.tool));
                 title { (title) " · luxproof score cards" }
                 style { (PreEscaped(BASE_STYLE)) (PreEscaped(STYLE)) }
-                noscript { style { ".filters{display:none}" } }
+                noscript { style { ".filters,.unfold{display:none}" } }
             }
             body {
                 a.skip href="#main" { "Skip to the content" }
@@ -88,7 +93,10 @@ fn frame(
                     div.bar {
                         a.brand href={ (root) "index.html" } { "luxproof score cards" }
                         @for crumb in crumbs { span aria-hidden="true" { "›" } a href={ (root) (crumb.link) } { (crumb.name) } }
-                        a.about href={ (root) "capabilities.html" } { "What is tested, and how" }
+                        span.about {
+                            @if !cards.seeds.is_empty() { a href={ (root) (hidden_page::FILE) } { "Hidden variants" } " " }
+                            a href={ (root) "capabilities.html" } { "What is tested, and how" }
+                        }
                     }
                 }
                 main id="main" { (content) }
@@ -107,23 +115,26 @@ fn sign(standing: &Standing) -> Markup {
     html! { span.sign aria-hidden="true" { (standing.sign()) } }
 }
 
+/// Key, sign, word and meaning of every state.
+const STATES: [(&str, &str, &str, &str); 6] = [
+    (
+        "accurate",
+        "✓",
+        "within x %",
+        "every point of every case passes; no error is larger than x, uncertainty included",
+    ),
+    ("limited", "≈", "limited", "right within limits that are known, or not decided yet"),
+    ("wrong", "✕", "wrong", "at least one value is wrong; the page names the fault"),
+    ("failed", "!", "fails", "it crashes, gives no answer in time or an unreadable one"),
+    ("unsupported", "–", "not supported", "the renderer refuses it and says why"),
+    ("untested", "·", "not tested", "too few cases were run"),
+];
+
 /// What the signs mean.
 fn legend() -> Markup {
-    const MEANINGS: [(&str, &str, &str, &str); 5] = [
-        (
-            "accurate",
-            "✓",
-            "within x %",
-            "every point of every case passes; no error is larger than x, uncertainty included",
-        ),
-        ("limited", "≈", "limited", "right within limits that are known, or not decided yet"),
-        ("wrong", "✕", "wrong", "at least one value is wrong; the page names the fault"),
-        ("unsupported", "–", "not supported", "the renderer cannot do it"),
-        ("untested", "·", "not tested", "too few cases were run"),
-    ];
     html! {
         dl.legend {
-            @for (key, sign, word, meaning) in MEANINGS {
+            @for (key, sign, word, meaning) in STATES {
                 div { dt class={ "s-" (key) } { span.sign aria-hidden="true" { (sign) } " " (word) } dd { (meaning) } }
             }
         }

@@ -72,11 +72,11 @@ fn row(renderer: &RendererCard, capability: &Capability) -> Markup {
 /// A cell of a release: its bound, or its state.
 fn short(standing: &Standing) -> String {
     match standing {
-        Standing::Accurate { worst: Some(worst) } => worst.bound_text(),
+        Standing::Accurate { worst: Some(worst) } => worst.deviation.bound_text(),
         Standing::Limited { worst: Some(worst), .. } | Standing::Wrong { worst: Some(worst), .. } => {
-            format!("{}, {}", standing.word(), worst.bound_text())
+            format!("{}, {}", standing.word(), worst.deviation.bound_text())
         }
-        other => other.word().to_owned(),
+        other => other.headline(),
     }
 }
 
@@ -101,7 +101,8 @@ fn release_changes(cards: &Cards, renderer: &RendererCard, release: &ReleaseCard
                 }
             }
             p.where {
-                @if !release.versions.is_empty() { "Version: " (release.versions.iter().join(", ")) ". " }
+                @let version = release.version_text();
+                @if !version.is_empty() { "Version: " (version) ". " }
                 @let runs = cards.runs.iter().filter(|run| release.runs.contains(&run.id)).collect_vec();
                 @for run in &runs {
                     @if let Some(report) = &run.report { a href={ (ROOT) (report) } { "Report of " (run.started.split('T').next().unwrap_or_default()) } " " }

@@ -79,11 +79,56 @@ fn a_cell_has_a_sign_a_text_and_a_class_and_leads_to_the_evidence_of_its_release
         cell.starts_with("class=\"s-wrong\"") && cell.contains("✕") && cell.contains("wrong, up to 51\u{a0}%"),
         "{cell}"
     );
-    assert!(cell.contains("href=\"renderers/rays/direct.html#r-2.0\"") && cell.contains("since 2.0"), "{cell}");
+    assert!(cell.contains("href=\"renderers/rays/direct.html#r-2.0\"") && cell.contains("worst: a"), "{cell}");
+    assert!(cell.contains("since <strong>2.0</strong>, before: within 0.20"), "{cell}");
     let evidence = content(&files, "renderers/rays/direct.html");
     for text in ["floor[0]", "150.000 lx", "100.000 lx", "+50.00 ± 0.10 %", "hidden, seed 7", "within 0.20 %"] {
         assert!(evidence.contains(text), "no {text}");
     }
+}
+
+/// The data from which the first page unfolds older releases.
+fn release_data(index: &str) -> serde_json::Value {
+    let (_, rest) = index.split_once("<script id=\"releases\" type=\"application/json\">").unwrap();
+    serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
+}
+
+#[test]
+fn the_first_page_has_the_cells_of_older_releases_and_their_links_lead_to_pages() {
+    let files = site(&usual());
+    let data = release_data(content(&files, "index.html"));
+    let renderer = data["renderers"].as_array().unwrap().iter().find(|renderer| renderer["name"] == "rays").unwrap();
+    assert_eq!(renderer["releases"], serde_json::json!([["2.0", "r-2.0"], ["1.0", "r-1.0"]]));
+    let code = renderer["cells"][0][0].as_u64().unwrap() as usize;
+    // 1.0 is the first, so that nothing changed; 0 is the number of `accurate`.
+    assert_eq!((code % 2, data["texts"][code / 2].as_str()), (0, Some("0within 0.20\u{a0}%")));
+    assert_eq!(data["states"][0], serde_json::json!(["accurate", "✓"]));
+    let page = format!("renderers/rays/{}.html", data["capabilities"][0].as_str().unwrap());
+    assert!(attributes(content(&files, &page), "id").contains(&"r-1.0"));
+}
+
+#[test]
+fn the_page_of_hidden_variants_has_both_bounds_and_names_who_is_right_in_public_only() {
+    let files = site(&usual());
+    let page = content(&files, "hidden.html");
+    assert!(page.contains("No renderer is right in the public cases only."));
+    assert!(page.contains("--seed 7 --out hidden"));
+    let cell = page.split("<td ").find(|cell| cell.contains("data-renderer=\"other\"")).unwrap();
+    assert!(cell.contains("similar") && cell.contains("<strong>0.20\u{a0}%</strong>, a"), "{cell}");
+    let tuned = [
+        MadeCase::new("a").off(0.0, 0.001),
+        MadeCase::new("b").off(0.0, 0.001),
+        MadeCase::new("a").hidden(7).off(0.05, 0.001),
+    ];
+    let files = site(&[report("tuned@1.0", "1.0", &tuned)]);
+    for page in ["index.html", "hidden.html"] {
+        let page = content(&files, page);
+        let (_, list) = page.split_once("Right in the public cases only").unwrap();
+        assert!(list.contains("renderers/tuned/direct.html#r-1.0"), "{list}");
+    }
+    // Without variants nothing is said about them.
+    let files = site(&[report("rays", "1.0", &[MadeCase::new("a").off(0.0, 0.0), MadeCase::new("b").off(0.0, 0.0)])]);
+    assert!(!files.iter().any(|file| file.path == "hidden.html" || file.content.contains("hidden.html")));
 }
 
 #[test]

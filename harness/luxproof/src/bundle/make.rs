@@ -36,6 +36,8 @@ pub struct BundleSummary {
     pub sha256: String,
     pub files: usize,
     pub bytes: u64,
+    /// The places of the specs in the bundle, in the order of the report.
+    pub specs: Vec<String>,
     /// Files beside those of programs that no command names and no program imports: whether these need them is not known.
     pub not_bundled: Vec<PathBuf>,
 }
@@ -72,7 +74,7 @@ pub fn make(run: &Path, out: &Path, licence: Option<&str>, trust: Trust) -> Resu
         files::replace_folder(out, |folder| copy_all(stage.path(), &sums, folder)).map_err(failed)?;
     }
     let sha256 = hexadecimal(&Sha256::digest(text));
-    Ok(BundleSummary { place: out.to_owned(), sha256, files: sums.len() + 1, bytes, not_bundled })
+    Ok(BundleSummary { place: out.to_owned(), sha256, files: sums.len() + 1, bytes, specs: lock.specs, not_bundled })
 }
 
 /// Refuses a folder with any file that no list of hashes there names: only a bundle is replaced.
@@ -103,6 +105,12 @@ fn copy_all(stage: &Path, sums: &Sums, folder: &Path) -> io::Result<()> {
 /// Resolves a path that a report names, below the current folder where the report is a stranger's.
 fn resolve_named(path: &str, trust: Trust) -> Result<PathBuf, Faults> {
     ForeignPath::from(PathBuf::from(path)).resolve(trust, Path::new("")).map_err(Faults::from)
+}
+
+/// The place of each spec of a report in its bundle, by the path that the run was given. `places` are in the order of the report.
+pub fn spec_places(report: &Report, places: &[String]) -> BTreeMap<String, String> {
+    let asked = report.cases.iter().filter(|case| !case.is_calibration);
+    asked.map(|case| case.spec.path.clone()).dedup().zip(places.iter().cloned()).collect()
 }
 
 /// The specs of a run with what they take, each once; all must be what they were.

@@ -23,7 +23,7 @@ use luxproof_process::printable::quoted;
 use luxproof_report_file::ReadError;
 use luxproof_spec::Faults;
 
-pub use make::{BundleSummary, make};
+pub use make::{BundleSummary, make, spec_places};
 pub use open::{Opened, is_bundle};
 pub use rerun::{Difference, EngineThen, Outcome, Reproduction, Row};
 

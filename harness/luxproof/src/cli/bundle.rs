@@ -26,7 +26,7 @@ pub(super) struct BundleArgs {
 pub(super) fn bundle(args: &BundleArgs, trust: Trust) -> Result<Exit, Diagnostic> {
     let out = args.out.clone().unwrap_or_else(|| default_folder(&args.run));
     let made = bundle::make(&args.run, &out, args.licence.as_deref(), trust).map_err(refused)?;
-    let bundle::BundleSummary { place, sha256, files, bytes, not_bundled } = made;
+    let bundle::BundleSummary { place, sha256, files, bytes, not_bundled, .. } = made;
     print(&format!("{}\n", place.display()))?;
     if !not_bundled.is_empty() {
         let mut names: Vec<String> = not_bundled.iter().take(SHOWN).map(|file| file.display().to_string()).collect();

@@ -173,8 +173,9 @@ fn write_site(
         let folder = format!("{RUNS}/{}", source.run.id.as_str());
         source.run.report = Some(format!("{folder}/{}", luxproof_report::PAGE));
         let zip = stage.path().join(format!("{}.zip", source.run.id.as_str()));
-        if pack(source, &zip, trust)? {
+        if let Some(specs) = pack(source, &zip, trust)? {
             source.run.bundle = Some(format!("{folder}/{BUNDLE}"));
+            source.run.bundled_specs = specs;
             packed.insert(source.run.id.clone(), zip);
         }
     }
@@ -212,19 +213,23 @@ fn copy_shared(from: &Path, to: &Path) -> io::Result<()> {
     io::copy(&mut File::open(from)?, &mut File::create(to)?).map(drop)
 }
 
-/// Packs the bundle of a run; whether there is one. A run that cannot be packed is on the site without.
-fn pack(source: &Source, zip: &Path, trust: Trust) -> Result<bool, Diagnostic> {
+/// Packs the bundle of a run and returns the places of its specs. A run that cannot be packed is on the site without a bundle.
+fn pack(source: &Source, zip: &Path, trust: Trust) -> Result<Option<BTreeMap<String, String>>, Diagnostic> {
     match &source.bundle {
-        BundleSource::None => Ok(false),
-        BundleSource::Opened(opened) => opened.write_zip(zip).map(|()| true).map_err(refused),
+        BundleSource::None => Ok(None),
+        BundleSource::Opened(opened) => {
+            opened.write_zip(zip).map_err(refused)?;
+            Ok(Some(bundle::spec_places(&source.report, &opened.lock.specs)))
+        }
         BundleSource::Site(file) => {
-            fs::copy(file, zip).map(|_| true).map_err(|e| FileError::of(file, e)).into_diagnostic()
+            fs::copy(file, zip).map_err(|e| FileError::of(file, e)).into_diagnostic()?;
+            Ok(Some(source.run.bundled_specs.clone()))
         }
         BundleSource::Run(folder) => match bundle::make(folder, zip, None, trust) {
-            Ok(_) => Ok(true),
+            Ok(made) => Ok(Some(bundle::spec_places(&source.report, &made.specs))),
             Err(error) => {
                 complain(&format!("{}: no bundle on the site: {error}", folder.display()));
-                Ok(false)
+                Ok(None)
             }
         },
     }
