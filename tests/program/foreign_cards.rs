@@ -108,7 +108,7 @@ fn a_folder_with_other_files_than_a_bundles_is_not_replaced_by_one() {
     folder.write("crate/ro-crate-metadata.json", "{}");
     folder.write("crate/measured.csv", "years of work");
     let answer = folder.luxproof(&["bundle", "out", "--out", "crate"]).exits(2);
-    assert!(answer.message().contains("no file of a bundle"), "{answer:?}");
+    assert!(answer.message().contains("holds files and no bundle, such as"), "{answer:?}");
     assert_eq!(folder.read("crate/measured.csv"), "years of work");
     folder.luxproof(&["bundle", "out", "--out", "b"]).exits(0);
     folder.luxproof(&["bundle", "out", "--out", "b"]).exits(0);

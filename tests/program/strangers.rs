@@ -879,7 +879,7 @@ fn strangers(args: &[&str]) -> Answer {
 /// By night `ci/nightly` looks at the limits themselves, with the program that ships.
 #[test]
 fn twice_as_much_costs_every_reader_twice_as_much() {
-    let quick = "sets|mtllib|GLDF|spheres|library|rows|deviations|keywords|boxes";
+    let quick = "sets|mtllib|GLDF|spheres|library|rows|deviations|keywords|boxes|cards|submission|pack";
     strangers(&["--doublings", "--only", quick, "--size", "0.25", "--cpu", "20", "--mib", "300"])
         .exits(0)
         .prints("sets to 2500");

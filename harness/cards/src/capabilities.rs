@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 const BUILT_IN: &str = include_str!("../data/capabilities.yaml");
 /// The file of the built-in capabilities in the repository.
 pub const EXAMPLE_FILE: &str = "reference/capabilities.yaml";
+/// The most capabilities of a file that is not trusted: each has pages for every renderer.
+const MAX_FOREIGN_CAPABILITIES: usize = 100;
 /// The longest id.
 const MAX_ID: usize = 60;
 
@@ -143,6 +145,10 @@ impl Capabilities {
         let help = "this luxproof reads version 1";
         source.require(read.version == 1, "version", format!("version {} is not known", read.version), help)?;
         source.require(!read.capabilities.is_empty(), "capabilities", "there are none", "give at least one")?;
+        let is_few = source.trust == Trust::Own || read.capabilities.len() <= MAX_FOREIGN_CAPABILITIES;
+        let message = format!("{} capabilities, and the file is not trusted", read.capabilities.len());
+        let help = format!("give at most {MAX_FOREIGN_CAPABILITIES}, or leave out --untrusted if the file is yours");
+        source.require(is_few, "capabilities", message, help)?;
         let mut ids = BTreeSet::new();
         for (k, capability) in read.capabilities.iter().enumerate() {
             let place = format!("capabilities[{k}]");

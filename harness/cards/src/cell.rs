@@ -1,6 +1,6 @@
 //! The rule: evidence of cases to a cell of the matrix. The worst case counts.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::fmt;
 
 use itertools::Itertools;
@@ -25,7 +25,7 @@ pub struct Cell {
     pub hidden_variants: usize,
     /// Comparisons behind the cell.
     pub points: usize,
-    /// Cases of the capability that no run has.
+    /// The first cases of the capability that no run has, at most 20.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
     /// Public against hidden cases; null without hidden ones.
@@ -239,9 +239,10 @@ impl Standing {
 pub fn judge(capability: &Capability, evidence: &[CaseEvidence]) -> Cell {
     let (public, hidden): (Vec<_>, Vec<_>) = evidence.iter().partition(|e| e.hidden.is_none());
     let tested: BTreeSet<&str> = public.iter().filter(|e| e.measurement().is_some()).map(|e| e.case.as_str()).collect();
-    let is_there = |case: &str| public.iter().any(|e| e.case == case);
+    let there: HashSet<&str> = public.iter().map(|e| e.case.as_str()).collect();
     let named = capability.cases.iter().map(|selector| selector.case.as_str()).unique();
-    let missing: Vec<String> = named.filter(|case| !is_there(case)).map(str::to_owned).collect();
+    let missing = named.filter(|case| !there.contains(case)).take(LISTED_MISSING);
+    let missing: Vec<String> = missing.map(str::to_owned).collect();
     let spread = spread(&public, &hidden);
     let standing = wrong(evidence, spread.as_ref())
         .or_else(|| without_answer(evidence, spread.as_ref()))
@@ -258,6 +259,9 @@ pub fn judge(capability: &Capability, evidence: &[CaseEvidence]) -> Cell {
         spread,
     }
 }
+
+/// Missing cases that a cell lists: each cell would list all of a long file of capabilities.
+const LISTED_MISSING: usize = 20;
 
 impl CaseEvidence {
     /// Its values, where there are any.

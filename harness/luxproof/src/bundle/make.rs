@@ -80,7 +80,7 @@ pub fn make(run: &Path, out: &Path, licence: Option<&str>, trust: Trust) -> Resu
 /// Refuses a folder with any file that no list of hashes there names: only a bundle is replaced.
 fn refuse_other_files(folder: &Path) -> Result<(), BundleError> {
     if folder.exists() && !folder.is_dir() {
-        return Err(BundleError::Occupied(quoted_path(folder)));
+        return Err(FileError::of(folder, io::Error::from(io::ErrorKind::NotADirectory)).into());
     }
     let listed = read_bounded(&folder.join(SUMS), MAX_KEPT_BYTES).ok().and_then(|text| String::from_utf8(text).ok());
     let listed = listed.and_then(|text| sums::parse(&text)).unwrap_or_default();
@@ -88,7 +88,8 @@ fn refuse_other_files(folder: &Path) -> Result<(), BundleError> {
         let name = entry.path().strip_prefix(folder).ok().and_then(name);
         let is_listed = name.is_some_and(|name| listed.contains_key(&name) || (name == SUMS && !listed.is_empty()));
         if !is_listed {
-            return Err(BundleError::Occupied(quoted_path(entry.path())));
+            let file = quoted_path(entry.path().strip_prefix(folder).unwrap_or(entry.path()));
+            return Err(BundleError::Occupied { folder: quoted_path(folder), file });
         }
     }
     Ok(())

@@ -15,9 +15,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use luxproof_model::EngineStatus;
 use luxproof_model::Request;
 use luxproof_model::Tool;
+use luxproof_model::{EngineStatus, Report};
 use luxproof_process::files::FileError;
 use luxproof_process::printable::quoted;
 use luxproof_report_file::ReadError;
@@ -76,8 +76,8 @@ pub enum BundleError {
     Absolute { spec: String, file: String },
     #[error("{} cannot be the name of a file in a bundle: rename it, and run its spec again", .0.display())]
     Name(PathBuf),
-    #[error("{0} is there, and is no file of a bundle that luxproof wrote: name another folder with --out")]
-    Occupied(String),
+    #[error("{folder} holds files and no bundle, such as {file}: name another folder with --out")]
+    Occupied { folder: String, file: String },
     #[error("{0} is no bundle: it holds no SHA256SUMS")]
     NoBundle(String),
     #[error("{bundle} is not what was bundled:\n  {}", list(.faults))]
@@ -102,6 +102,13 @@ pub fn excess(request: &Request) -> Option<String> {
     ];
     let (what, count) = lists.into_iter().find(|(_, count)| *count > MAX_FOREIGN_NAMES)?;
     Some(format!("names {count} {what}, and no request that is not trusted more than {MAX_FOREIGN_NAMES}"))
+}
+
+/// Why a report of a stranger is not used: each engine has files and pages.
+pub fn excess_of_report(report: &Report) -> Option<String> {
+    let count = report.engines.len();
+    let message = format!("has {count} engines, and no report that is not trusted more than {MAX_FOREIGN_NAMES}");
+    (count > MAX_FOREIGN_NAMES).then_some(message)
 }
 
 /// More of them are counted, not named.

@@ -128,6 +128,9 @@ impl Opened {
             return Err(broken(faults));
         }
         let report = luxproof_report_file::read(&stage.path().join(RUN).join(REPORT_FILE))?;
+        if let Some(excess) = super::excess_of_report(&report).filter(|_| trust != Trust::Own) {
+            return Err(broken(vec![format!("{RUN}/{REPORT_FILE} {excess}")]));
+        }
         Ok(Self { lock, report, sha256, files: listed.len() + 1, stage })
     }
 

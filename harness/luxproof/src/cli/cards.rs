@@ -148,6 +148,9 @@ fn source(path: &Path, no_bundle: bool, trust: Trust) -> Result<Source, Diagnost
         return Ok(Source { run, report, file, bundle });
     }
     let report = read_report(path)?;
+    if let Some(excess) = bundle::excess_of_report(&report).filter(|_| trust != Trust::Own) {
+        return Err(miette!(help = "use it without --untrusted if it is yours", "{} {excess}", path.display()));
+    }
     let file = report_file(path);
     let folder = file.parent().unwrap_or(Path::new("")).to_owned();
     let bundle = if no_bundle || trust != Trust::Own { BundleSource::None } else { BundleSource::Run(folder) };
