@@ -1,6 +1,7 @@
 // Looks at sites of score cards as a reader would: node cards.mjs SITE...; names what is wrong and fails.
 import { createRequire } from "node:module";
 import path from "node:path";
+import { fileURLToPath } from "node:url";
 import { existsSync, readdirSync, readFileSync, statSync } from "node:fs";
 import { start } from "./chromium.mjs";
 
@@ -55,6 +56,52 @@ async function filters(page, place) {
   check(place, (await rows.count()) === allRows && (await heads.count()) === allHeads, "cleared filters leave something out");
 }
 
+// Unfolds the first renderer by keyboard, all of them by the list, and one release by its address.
+async function releases(page, place) {
+  const heads = page.locator("#matrix thead th:not([hidden])");
+  const newest = await heads.count();
+  const button = page.locator("#matrix thead button").first();
+  if ((await button.count()) === 0) return;
+  const count = Number.parseInt(await button.textContent(), 10);
+  if (await button.isVisible()) {
+    await button.focus();
+    await page.keyboard.press("Enter");
+    check(place, (await button.getAttribute("aria-expanded")) === "true", "the button does not say that it is open");
+    check(place, (await heads.count()) === newest + count - 1, `${count} releases unfold into ${(await heads.count()) - newest + 1}`);
+    await page.reload();
+    check(place, (await heads.count()) === newest + count - 1, "the address does not hold what is unfolded");
+    await accessible(page, `${place}, unfolded`);
+    await button.focus();
+    await page.keyboard.press("Space");
+    check(place, (await heads.count()) === newest, "the button does not fold");
+  }
+  const took = await page.evaluate(() => {
+    const list = document.getElementById("release"), began = performance.now();
+    list.value = "all";
+    list.dispatchEvent(new Event("change"));
+    document.body.getBoundingClientRect();
+    return performance.now() - began;
+  });
+  const cells = page.locator("#matrix td:not([hidden]) a.cell");
+  console.log(`${place}: all releases unfold in ${Math.round(took)} ms, ${await cells.count()} cells`);
+  // Minutes on a large site, and the same markup at every width.
+  if (page.viewportSize().width > 1000) await accessible(page, `${place}, all releases`);
+  const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+  check(place, wide <= page.viewportSize().width, `with all releases it is ${wide} wide`);
+  // The last release of the first renderer that has several.
+  const last = await page.locator("#release optgroup").evaluateAll((groups) =>
+    groups.filter((group) => group.children.length > 2).map((group) => [group.lastElementChild.value, group.lastElementChild.textContent])[0]);
+  await page.locator("#release").selectOption(last[0]);
+  await page.reload();
+  check(place, (await heads.count()) === 2 && page.url().includes("release="), "the address does not hold the release");
+  const links = await cells.evaluateAll((found) => found.map((cell) => cell.getAttribute("href")));
+  const anchor = last[0].split("@")[1];
+  check(place, links.length > 0 && links.every((link) => link.endsWith(`#${anchor}`)), `cells of ${last[1]} lead to ${links[0]}`);
+  const dead = links.filter((link) => !existsSync(path.resolve(path.dirname(fileURLToPath(page.url())), link.split("#")[0])));
+  check(place, dead.length === 0, `cells of ${last[1]} lead nowhere: ${dead[0]}`);
+  await page.locator("#release").selectOption("");
+}
+
 async function keyboard(page, place) {
   const cell = page.locator("#matrix a.cell").first();
   const link = await cell.getAttribute("href");
@@ -85,6 +132,7 @@ async function look(folder, file, { width, colorScheme }) {
     const ready = await page.evaluate(() => performance.getEntriesByType("navigation")[0].domInteractive);
     console.log(`${place}: interactive after ${Math.round(ready)} ms`);
     await filters(page, place);
+    await releases(page, place);
     await keyboard(page, place);
     if (width > 1000) await print(page, place);
   }
@@ -104,7 +152,7 @@ for (const folder of process.argv.slice(2)) {
   // The first page, the rule, and of renderers and evidence the first and the last.
   const renderers = all.filter((page) => page.startsWith("renderers") && page.endsWith("index.html"));
   const evidence = all.filter((page) => page.startsWith("renderers") && !page.endsWith("index.html"));
-  const some = ["index.html", "capabilities.html", renderers[0], renderers.at(-1), evidence[0], evidence.at(-1)];
+  const some = ["index.html", "capabilities.html", ...all.filter((page) => page === "hidden.html"), renderers[0], renderers.at(-1), evidence[0], evidence.at(-1)];
   for (const file of new Set(some)) {
     for (const width of [1440, 390]) await look(folder, file, { width, colorScheme: "light" });
     await look(folder, file, { width: 1440, colorScheme: "dark" });

@@ -104,8 +104,8 @@ fn an_adapter_that_recognises_the_public_cases_is_exposed_by_hidden_ones() {
         (&cell["spread"]["is_public_only"], &cell["spread"]["seeds"]),
         (&Value::from(true), &serde_json::json!([11]))
     );
-    let public = cell["spread"]["public"]["value"].as_f64().unwrap();
-    let hidden = cell["spread"]["hidden"]["value"].as_f64().unwrap();
+    let public = cell["spread"]["public"]["deviation"]["value"].as_f64().unwrap();
+    let hidden = cell["spread"]["hidden"]["deviation"]["value"].as_f64().unwrap();
     assert!(public.abs() < 1e-6 && (hidden - 0.05).abs() < 1e-6, "{public} {hidden}");
     assert!(tuned.read("site/renderers/mine/direct.html").contains("hidden, seed 11"));
     assert!(tuned.read("site/index.html").contains("Seed: 11."));
@@ -118,7 +118,7 @@ fn an_honest_adapter_is_accurate_in_public_and_hidden_cases() {
     let cell = cell(&honest, "mine");
     assert_eq!(cell["standing"]["state"], "accurate", "{cell}");
     assert_eq!((&cell["tested_cases"], &cell["hidden_variants"]), (&Value::from(1), &Value::from(1)));
-    assert!(cell["standing"]["worst"]["value"].as_f64().unwrap().abs() < 1e-6);
+    assert!(cell["standing"]["worst"]["deviation"]["value"].as_f64().unwrap().abs() < 1e-6);
     // What the cell leads to.
     let run = honest.json("site/cards.json")["runs"][0].clone();
     for file in ["report", "bundle"] {
@@ -258,4 +258,90 @@ fn a_folder_of_other_files_is_not_replaced_and_wrong_input_says_what_to_do() {
     folder.edit("capabilities.yaml", "minimum_cases: 1", "minimum_cases: 9");
     let answer = folder.luxproof(&["cards", "out", "--capabilities", "capabilities.yaml", "--out", "other"]).exits(2);
     assert!(answer.message().contains("9 of 1 cases are needed"), "{answer:?}");
+}
+
+/// The pages of a site: their paths below it, without the reports of runs.
+fn pages(folder: &Folder, below: &str) -> Vec<String> {
+    let mut found = vec![];
+    for entry in fs::read_dir(folder.path(&format!("site/{below}"))).unwrap() {
+        let entry = entry.unwrap();
+        let name = format!("{below}{}", entry.file_name().to_str().unwrap());
+        if entry.path().is_dir() {
+            found.extend(pages(folder, &format!("{name}/")));
+        } else if entry.path().extension().is_some_and(|extension| extension == "html") && !name.starts_with("runs/") {
+            found.push(name);
+        }
+    }
+    found
+}
+
+/// The texts between two others in a page.
+fn between<'a>(page: &'a str, start: &str, end: &str) -> Vec<&'a str> {
+    page.split(start).skip(1).filter_map(|rest| rest.split(end).next()).collect()
+}
+
+/// Unpacks a bundle of the site to a folder next to it.
+fn unpack(folder: &Folder, zip: &str) {
+    let file = fs::File::open(folder.path(zip)).unwrap();
+    zip::ZipArchive::new(file).unwrap().extract(folder.path("bundle")).unwrap();
+}
+
+/// Runs a line of a page in the unpacked bundle and returns what it prints.
+fn run_line(folder: &Folder, line: &str) -> String {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let (program, args) = words.split_first().unwrap();
+    assert_eq!(*program, "luxproof", "{line}");
+    let mut command = folder.command(args);
+    let answer = Answer::of(command.current_dir(folder.path("bundle")));
+    assert_eq!(answer.code, Some(0), "{line}: {answer:?}");
+    answer.stdout
+}
+
+#[test]
+fn every_link_file_and_command_of_a_site_works_from_the_site_alone() {
+    let folder = with_variant(&adapter(), 0);
+    cards(&folder, &["out"]).exits(0);
+    let bundle = folder.json("site/cards.json")["runs"][0]["bundle"].as_str().unwrap().to_owned();
+    unpack(&folder, &format!("site/{bundle}"));
+    // Whatever the run was made of is gone: only the site is left.
+    for name in ["spec.yaml", "lamp.ies", "adapter.py"] {
+        fs::remove_file(folder.path(name)).unwrap();
+    }
+    for name in ["hidden", "out"] {
+        fs::remove_dir_all(folder.path(name)).unwrap();
+    }
+    let all = pages(&folder, "");
+    assert!(all.iter().any(|page| page == "hidden.html") && all.len() >= 6, "{all:?}");
+    let (mut links, mut lines) = (0, vec![]);
+    for page in &all {
+        let text = folder.read(&format!("site/{page}"));
+        for link in between(&text, " href=\"", "\"") {
+            let path = link.split('#').next().unwrap();
+            let target = folder.path(&format!("site/{page}")).parent().unwrap().join(path);
+            assert!(path.is_empty() || target.is_file(), "{page}: no {link}");
+            links += 1;
+        }
+        for code in between(&text, "<pre class=\"commands\" tabindex=\"0\"><code>", "</code>") {
+            lines.extend(code.lines().map(str::to_owned));
+        }
+        assert!(!text.contains(folder.path("").to_str().unwrap()), "{page} has a path of the machine that ran it");
+    }
+    assert!(links > 40, "{links}");
+    lines.sort();
+    lines.dedup();
+    let unpacking: Vec<String> = lines.extract_if(.., |line| line.starts_with("unzip ")).collect();
+    assert_eq!(unpacking, ["unzip -q bundle.zip -d bundle &amp;&amp; cd bundle"]);
+    let of_adapter: Vec<&String> = lines.iter().filter(|line| line.contains("--engine mine ")).collect();
+    assert_eq!(of_adapter.len(), 2, "the public case and its variant: {lines:?}");
+    for line in &lines {
+        for file in line.split_whitespace().filter(|word| word.starts_with("inputs/")) {
+            assert!(folder.path(&format!("bundle/{file}")).is_file(), "{line}");
+        }
+        let printed = run_line(&folder, line);
+        if let Some(by_hand) = printed.lines().find(|line| line.trim_start().starts_with("cd ")) {
+            let mut shell = std::process::Command::new("sh");
+            let answer = Answer::of(shell.args(["-c", by_hand]).current_dir(folder.path("bundle")));
+            assert!(answer.code == Some(0) && answer.stdout.contains("readings"), "{by_hand}: {answer:?}");
+        }
+    }
 }
