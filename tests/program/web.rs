@@ -48,6 +48,25 @@ fn babylon_js_reads_one_plane() {
     assert!(worst > 0.3, "{worst}");
 }
 
+/// A path tracer of the web: the light of a plain room, straight and reflected.
+#[test]
+fn three_gpu_pathtracer_reads_a_plain_room_right() {
+    let spec = root().join("reference/web/three-gpu-pathtracer.yaml");
+    let (report, code) = run_reference(&[spec.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{}", report["engines"]);
+    let engine = [("engine", "three-gpu-pathtracer"), ("verdict", "pass")];
+    for procedure in ["direct_illuminance", "indirect_illuminance"] {
+        let passed = among(&report, "comparisons", &[engine[0], engine[1], ("procedure", procedure)]);
+        assert_eq!(passed.len(), 4, "{procedure}");
+    }
+    let reflected = among(&report, "comparisons", &[engine[0], ("procedure", "indirect_illuminance")]);
+    // Each states what its paths scatter by, below a percent.
+    for c in reflected {
+        let error = c["std_error"].as_f64().unwrap() / c["value"].as_f64().unwrap();
+        assert!(error > 1e-4 && error < 0.012, "{c}");
+    }
+}
+
 /// What is theirs is on record, with its size at each meter: a release that reads otherwise fails, a right one is an unexpected pass.
 #[test]
 fn the_doctor_finds_them_as_they_are_on_record() {

@@ -17,6 +17,7 @@ pub const ALL: &[&Entry] = &[
     &luxcore::ENTRY,
     &web::THREE,
     &web::BABYLON,
+    &web::THREE_GPU_PATHTRACER,
 ];
 
 pub fn all() -> Vec<Box<dyn Engine>> {

@@ -163,7 +163,7 @@ impl Component {
             Self::Libraries(libraries) => libraries.name,
             Self::Blender => "Blender",
             Self::LuxCore => "LuxCore",
-            Self::WebPackages => "three.js and Babylon.js",
+            Self::WebPackages => "renderers of the web",
             Self::Chromium => "Chromium",
             Self::Release(known) => known.name,
         }
@@ -267,7 +267,7 @@ mod tests {
         assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm, ATOMIC]);
         assert_eq!(components(&[EngineName::new("cycles")]), [X11, Component::Blender]);
         assert_eq!(components(&[EngineName::new("luxcore")]), [ATOMIC, Component::LuxCore]);
-        for name in ["three", "babylon"] {
+        for name in ["three", "babylon", "three-gpu-pathtracer"] {
             assert_eq!(components(&[EngineName::new(name)]), [Component::WebPackages, Component::Chromium]);
         }
         let release = releases::known("mitsuba@3.5.2").unwrap();

@@ -1,8 +1,10 @@
-//! three.js and Babylon.js: the IES loaders of the web, with the renderers that use them, in headless Chromium.
+//! three.js, Babylon.js and three-gpu-pathtracer: the IES loaders of the web, with the renderers that use them, in headless Chromium.
 //!
 //! Their own code loads the file and shades: what is audited is what a page of theirs shows, in WebGL 2 by software (`SwiftShader`), which is
-//! the same on every machine. Direct light of points alone: their shadows are maps of so many texels, and reflected light they have none.
+//! the same on every machine. three.js and Babylon.js have direct light of points alone: their shadows are maps of so many texels, and
+//! reflected light they have none. The path tracer has both.
 
+mod pathtracer;
 mod settings;
 #[cfg(test)]
 pub(super) mod tests;
@@ -17,13 +19,16 @@ use serde::{Deserialize, Serialize};
 
 use self::settings::Settings;
 use super::dialogue::JOB_FILE;
+use super::frame::Frame;
 use super::job_dir::by_hand;
 use super::{
     Absent, Component, Engine, EngineError, EngineRoot, Entry, Job, JobDir, Measurement, SceneFile, Sensor, Setting,
     Support, Version, checked,
 };
 use luxproof_model::{EngineName, Estimate, Uncertainty};
-use luxproof_process::process;
+use luxproof_process::process::{self, Invocation};
+
+pub(super) use pathtracer::ENTRY as THREE_GPU_PATHTRACER;
 
 const INSTALLS: &[Component] = &[Component::WebPackages, Component::Chromium];
 
@@ -74,9 +79,10 @@ impl Library {
         }
     }
 
-    /// The folder of a release among the packages.
+    /// The folder of a release among the packages. The newest three.js has its own name, by which other packages find it.
     fn package(self, release: &str) -> String {
         match self {
+            Self::Three if release == settings::RELEASES[0] => "three".to_owned(),
             Self::Three => format!("three-{release}"),
             Self::Babylon => "@babylonjs/core".to_owned(),
         }
@@ -85,6 +91,9 @@ impl Library {
 
 pub(super) struct Web(Library);
 
+/// The modules that scripts of a page name, each with its place below the page.
+type Imports = BTreeMap<&'static str, &'static str>;
+
 /// What the driver reads.
 #[derive(Serialize)]
 struct PageJob<'a> {
@@ -92,6 +101,7 @@ struct PageJob<'a> {
     procedure: &'a str,
     page: &'a str,
     package: String,
+    imports: Imports,
     texture: &'a str,
     lamps: Vec<Lamp>,
     meters: Vec<PageMeter<'a>>,
@@ -163,6 +173,12 @@ impl Lamp {
             axes: luminaire.orientation.to_cols_array_2d(),
         }
     }
+
+    /// Returns it in the coordinates of a scene.
+    fn in_frame(self, frame: &Frame) -> Self {
+        let position = frame.to_scene(self.position.into()).to_array();
+        Self { candela: self.candela * frame.scale * frame.scale, position, ..self }
+    }
 }
 
 /// Returns the version in the manifest of an npm package.
@@ -181,26 +197,11 @@ impl Engine for Web {
     }
 
     fn probe(&self, site: &EngineRoot) -> Result<Version, Absent> {
-        let remedy = format!("run `luxproof engines install {}`", self.name());
-        let absent = |reason: &str| Absent { reason: reason.to_owned(), remedy: remedy.clone() };
-        let node = site.node().ok_or_else(|| absent("there is no Node.js for it"))?;
-        let packages = site.web_packages().ok_or_else(|| absent("its packages of npm are not there"))?;
-        let chromium = site.chromium().ok_or_else(|| absent("there is no Chromium to run it in"))?;
-        let finished = process::ask(chromium.clone(), "--version", |run| run).map_err(|e| absent(&e.to_string()))?;
-        let chromium_version = String::from_utf8_lossy(&finished.stdout).trim().to_owned();
-        let modules = packages.join("node_modules");
-        let releases: Vec<PathBuf> = match self.0 {
-            Library::Three => settings::RELEASES.iter().map(|release| modules.join(self.0.package(release))).collect(),
-            Library::Babylon => vec![modules.join(self.0.package(""))],
+        let packages = match self.0 {
+            Library::Three => settings::RELEASES.iter().map(|release| self.0.package(release)).collect(),
+            Library::Babylon => vec![self.0.package("")],
         };
-        let mut versions = vec![];
-        for folder in &releases {
-            let version = packaged_version(folder);
-            versions.push(version.ok_or_else(|| absent(&format!("{} is missing or of no version", folder.display())))?);
-        }
-        let text = format!("{} in {chromium_version}", versions.join(" and "));
-        let files = [node, chromium, modules.join("playwright-core")].into_iter().chain(releases);
-        Ok(Version::of(&self.name(), text, site, files))
+        probe(&self.name(), site, &packages)
     }
 
     fn supports(&self, job: &Job) -> Support {
@@ -221,6 +222,7 @@ impl Engine for Web {
             procedure: job.procedure.name(),
             page,
             package: self.0.package(settings.release),
+            imports: ["three", "three/webgpu"].map(|module| (module, "/package/build/three.webgpu.js")).into(),
             texture: settings.texture,
             lamps: job.scene.luminaires.iter().enumerate().map(|(k, l)| Lamp::of(k, l)).collect(),
             meters: job.sensors.iter().map(PageMeter::of).collect(),
@@ -237,11 +239,7 @@ impl Engine for Web {
     }
 
     fn command_by_hand(&self, _job: &Job, site: &EngineRoot) -> Option<String> {
-        let node = site.node().unwrap_or_else(|| "node".into());
-        let packages = site.web_packages().unwrap_or_else(|| "packages".into());
-        let chromium = site.chromium().unwrap_or_else(|| "chromium".into());
-        let words = [DRIVER.0.into(), JOB_FILE.into(), packages, chromium];
-        Some(by_hand(node).args(words).command_line_with_env())
+        Some(command_by_hand(site))
     }
 
     fn settings(&self) -> &'static [Setting] {
@@ -262,11 +260,7 @@ impl Engine for Web {
 
     fn read(&self, job: &Job, workbench: &JobDir) -> Result<Measurement, EngineError> {
         workbench.write(&self.export(job)?)?;
-        let gone = || self.error("is no longer there");
-        let site = &workbench.site;
-        let (node, packages) = (site.node().ok_or_else(gone)?, site.web_packages().ok_or_else(gone)?);
-        let chromium = site.chromium().ok_or_else(gone)?;
-        let run = workbench.invoke(node).args([DRIVER.0.into(), "--serve".into(), packages, chromium]);
+        let run = driver(&self.name(), workbench)?;
         let mut driver = run.converse(workbench.idle.as_ref())?;
         let asked = serde_json::json!({ "job": workbench.scene_dir.join(JOB_FILE) });
         let answer = driver.ask(&asked.to_string())?;
@@ -277,6 +271,50 @@ impl Engine for Web {
         driver.end()?;
         Ok(measurement)
     }
+}
+
+/// Returns the driver in a workbench, which answers what it is asked on its standard input.
+fn driver(engine: &EngineName, workbench: &JobDir) -> Result<Invocation, EngineError> {
+    let site = &workbench.site;
+    match (site.node(), site.web_packages(), site.chromium()) {
+        (Some(node), Some(packages), Some(chromium)) => {
+            Ok(workbench.invoke(node).args([DRIVER.0.into(), "--serve".into(), packages, chromium]))
+        }
+        _ => Err(EngineError::output(engine.clone(), "is no longer there")),
+    }
+}
+
+fn command_by_hand(site: &EngineRoot) -> String {
+    let node = site.node().unwrap_or_else(|| "node".into());
+    let packages = site.web_packages().unwrap_or_else(|| "packages".into());
+    let chromium = site.chromium().unwrap_or_else(|| "chromium".into());
+    by_hand(node).args([DRIVER.0.into(), JOB_FILE.into(), packages, chromium]).command_line_with_env()
+}
+
+/// Returns the version of an engine of these npm packages, with that of the browser.
+fn probe(engine: &EngineName, site: &EngineRoot, packages: &[String]) -> Result<Version, Absent> {
+    let node = site.node().ok_or_else(|| absent(engine, "there is no Node.js for it"))?;
+    let folder = site.web_packages().ok_or_else(|| absent(engine, "its packages of npm are not there"))?;
+    let chromium = site.chromium().ok_or_else(|| absent(engine, "there is no Chromium to run it in"))?;
+    let asked = process::ask(chromium.clone(), "--version", |run| run);
+    let finished = asked.map_err(|e| absent(engine, &e.to_string()))?;
+    let chromium_version = String::from_utf8_lossy(&finished.stdout).trim().to_owned();
+    let modules = folder.join("node_modules");
+    let releases: Vec<PathBuf> = packages.iter().map(|package| modules.join(package)).collect();
+    let mut versions = vec![];
+    for folder in &releases {
+        let Some(version) = packaged_version(folder) else {
+            return Err(absent(engine, &format!("{} is missing or of no version", folder.display())));
+        };
+        versions.push(version);
+    }
+    let text = format!("{} in {chromium_version}", versions.join(" and "));
+    let files = [node, chromium, modules.join("playwright-core")].into_iter().chain(releases);
+    Ok(Version::of(engine, text, site, files))
+}
+
+fn absent(engine: &EngineName, reason: &str) -> Absent {
+    Absent { reason: reason.to_owned(), remedy: format!("run `luxproof engines install {engine}`") }
 }
 
 fn file_name(k: usize) -> String {

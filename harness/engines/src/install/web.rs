@@ -53,7 +53,7 @@ pub(super) fn install(site: &EngineRoot, progress: &mut dyn FnMut(&str)) -> Resu
         let path = folder.join(name);
         fs::write(&path, text).map_err(|e| InstallError::io(&path, e))?;
     }
-    progress("downloading and installing three.js and Babylon.js, about 30 MB (160 MB on disk)");
+    progress("downloading and installing the renderers of the web, about 30 MB (180 MB on disk)");
     // No package runs anything while it is installed, and npm keeps nothing elsewhere.
     let cache = folder.join("cache");
     let quiet = ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--no-update-notifier", "--cache"];

@@ -24,7 +24,7 @@ const TILT: f64 = 4.0 * EPSILON / PATCH;
 
 /// The space about a meter's patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Space {
+pub(crate) enum Space {
     /// A surface is near, and the patch must stand off it.
     Tight,
     /// The patch may lie at the meter's exact point.
@@ -35,7 +35,7 @@ pub(super) enum Space {
 
 impl Space {
     /// Returns the space about each meter of an exported job, for patches of this side in metres.
-    pub(super) fn of(job: &Job, side_m: f64) -> Vec<Self> {
+    pub(crate) fn of(job: &Job, side_m: f64) -> Vec<Self> {
         let is_tight = beside_a_surface(job, side_m);
         let is_narrow = beside_a_surface(job, WIDE * side_m);
         is_tight
