@@ -382,9 +382,11 @@ fn wrong(evidence: &[CaseEvidence], spread: Option<&Spread>) -> Option<Standing>
 /// The known limit of the public case of a hidden variant. It counts for the case that declares it and for no other.
 fn public_limit(variant: &CaseEvidence, evidence: &[CaseEvidence]) -> Option<String> {
     variant.hidden.as_ref()?;
-    let mut public =
+    let public =
         evidence.iter().filter(|e| e.hidden.is_none() && e.case == variant.case && e.procedure == variant.procedure);
-    public.find_map(|e| e.limits().into_iter().map(|limit| limit.text).find(|text| !text.is_empty()))
+    public
+        .filter(|e| !e.is_faulty())
+        .find_map(|e| e.limits().into_iter().map(|limit| limit.text).find(|text| !text.is_empty()))
 }
 
 /// A cell with cases that give no values and are not refused either.
@@ -675,8 +677,9 @@ mod tests {
                 Some("ies2rad failed:   - /home/me/lib.so\n  - /home/me/b.so\nunsupported type\nall its messages are in /home/me/log".to_owned());
             recording.failure_kind = Some(FailureKind::ErrorExit);
         }
-        let rejected =
-            Standing::NotSupported { reason: "it does not read the file: ies2rad failed; unsupported type".to_owned() };
+        let rejected = Standing::NotSupported {
+            reason: "it does not read the file: unsupported type; before that: ies2rad failed".to_owned(),
+        };
         assert_eq!(judged(&report), rejected);
         // A parser that crashes on a file refuses nothing.
         report.recordings.iter_mut().for_each(|recording| recording.failure_kind = Some(FailureKind::Crash));

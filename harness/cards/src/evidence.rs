@@ -326,9 +326,15 @@ fn failed(kind: Option<FailureKind>, reason: String, capability: &Capability) ->
 }
 
 /// The message of an engine in one line, without the places of files on the machine that ran it.
+///
+/// The last line comes first: there a program says why it ends.
 fn public_text(reason: &str) -> String {
     let lines = reason.lines().filter(|line| !line.starts_with("all its messages are in "));
-    lines.map(without_path).filter(|line| !line.is_empty()).join("; ")
+    let lines: Vec<&str> = lines.map(without_path).filter(|line| !line.is_empty()).collect();
+    match lines.split_last() {
+        Some((last, before)) if !before.is_empty() => format!("{last}; before that: {}", before.join("; ")),
+        _ => lines.concat(),
+    }
 }
 
 /// A line up to the first absolute path in it.

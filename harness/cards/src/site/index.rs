@@ -122,8 +122,10 @@ fn matrix_cell(renderer: &RendererCard, cell: &CellCard) -> Markup {
         td class={ "s-" (standing.key()) } data-renderer=(renderer.name) {
             a.cell href=(cell.page) {
                 (sign(standing)) " " (cell.headline.replace(" %", "\u{a0}%"))
-                @if let Standing::Wrong { fault: text, .. } | Standing::Limited { what: text, .. } | Standing::Failed { reason: text, .. } | Standing::NotSupported { reason: text } = standing {
-                    span.why { (shortened(first_clause(text), SHOWN_LETTERS)) }
+                @match standing {
+                    Standing::Wrong { fault: text, .. } | Standing::Limited { what: text, .. } => span.why { (shortened(first_clause(text), SHOWN_LETTERS)) },
+                    Standing::Failed { reason, .. } | Standing::NotSupported { reason } => span.why { (shortened(reason, SHOWN_LETTERS)) },
+                    Standing::Accurate { .. } | Standing::NotTested { .. } => {},
                 }
                 @if let Some(place) = standing.place() { span.since { "worst: " (shortened(&place.case_text(), CASE_LETTERS)) } }
                 @if let Some(since) = renderer.since(&cell.capability) { (since_line(since)) }
