@@ -68,13 +68,17 @@ pub fn solid_angle_sr([a, b, c]: [DVec3; 3]) -> f64 {
 
 /// The part of the whole sphere that the faces of a closed body fill around a point inside it, but for gaps of rounded corners.
 const CLOSED_PART: f64 = 0.999;
+/// The part of half the sphere beyond which a triangle fills so much of it only because the point is on it.
+const HALF_PART: f64 = 1.0 - 1e-9;
 
 /// Whether a point lies inside a closed body of these triangles: its faces then fill the whole sphere around the point.
 ///
-/// An open one, a lampshade say, leaves a part of it. What faces inwards is a room, as imported scenes have it.
+/// An open one, a lampshade say, leaves a part of it. What faces inwards is a room, as imported scenes have it. A point on a face
+/// is not inside: a face that the point is on counts as nothing, and the others fill half of the sphere at most.
 pub fn is_inside_closed(vertices_m: &[DVec3], triangles: &[[u32; 3]], point_m: DVec3) -> bool {
     let corners = triangles.iter().map(|t| t.map(|k| vertices_m[k as usize] - point_m));
-    corners.map(solid_angle_sr).sum::<f64>() > CLOSED_PART * 4.0 * std::f64::consts::PI
+    let seen = corners.map(solid_angle_sr).filter(|sr| sr.abs() < HALF_PART * 2.0 * std::f64::consts::PI);
+    seen.sum::<f64>() > CLOSED_PART * 4.0 * std::f64::consts::PI
 }
 
 /// The farthest that a vertex may be off, so that a volume is a number.
@@ -221,6 +225,33 @@ mod tests {
         let moved = mesh.clone().moved(DVec3::new(100.0, -3.0, 7.0));
         assert_relative_eq!(moved.volume_m3(), mesh.volume_m3(), max_relative = 1e-11);
         assert_eq!(moved.vertices_m[0], DVec3::new(101.0, -2.0, 7.0));
+    }
+
+    /// Two triangles of a sheet fill half of the sphere each, or so, around a point on the edge between them.
+    #[test]
+    fn nothing_is_inside_a_sheet_or_on_a_face() {
+        let cuboid = Mesh::cuboid(DVec3::new(-0.3, -0.1, 0.0), DVec3::new(0.3, 0.1, 0.2));
+        for turn_deg in 0..180 {
+            let turn = glam::DQuat::from_rotation_z(f64::from(turn_deg).to_radians());
+            let at_m = DVec3::new(4.5, 1.0, 3.0);
+            let is_inside = |triangles: &[[u32; 3]], point_m: DVec3| {
+                let vertices_m: Vec<DVec3> = cuboid.vertices_m.iter().map(|v| at_m + turn * *v).collect();
+                is_inside_closed(&vertices_m, triangles, at_m + turn * point_m)
+            };
+            let bottom = cuboid.triangles.iter().filter(|t| t.iter().all(|k| cuboid.vertices_m[*k as usize].z == 0.0));
+            let bottom: Vec<[u32; 3]> = bottom.copied().collect();
+            let turned: Vec<[u32; 3]> = bottom.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+            for sheet in [bottom, turned] {
+                assert_eq!(sheet.len(), 2);
+                assert!(!is_inside(&sheet, DVec3::ZERO), "{turn_deg}");
+            }
+            for outside in [DVec3::ZERO, DVec3::new(0.0, 0.0, -1e-6), DVec3::new(0.0, 0.0, 0.201)] {
+                assert!(!is_inside(&cuboid.triangles, outside), "{turn_deg} {outside}");
+            }
+            for inside in [DVec3::new(0.0, 0.0, 1e-6), DVec3::new(0.29, -0.09, 0.19), DVec3::new(0.0, 0.0, 0.1)] {
+                assert!(is_inside(&cuboid.triangles, inside), "{turn_deg} {inside}");
+            }
+        }
     }
 
     #[test]
