@@ -168,7 +168,7 @@ impl Options<'_> {
             calibration: Calibration::Judged,
             diagnosis: Diagnosis::Sought,
             stated_errors: Repetition::Examined,
-            asking: CacheMissPolicy::Engines,
+            asking: CacheMissPolicy::AskEngine,
             asked: RequestedReadings::default(),
             only: None,
             tool: Tool { version: env!("CARGO_PKG_VERSION").to_owned(), ..Tool::default() },

@@ -238,11 +238,17 @@ impl Engine for External {
         let code = code::below(&self.folders(&own), site.root());
         let mut text = format!("{} {}, {}", answer.name, answer.version, self.contents);
         if !code.is_all {
-            tracing::warn!("{}: more code lies about it than is looked at: it needs a folder of its own", self.id);
+            tracing::warn!(
+                "{}: its folder holds too much code to watch, so that some changes are not noticed; give it a folder without other programs",
+                self.id
+            );
             text += " (not all of its code)";
         }
         if depends_on.is_empty() && command::is_unknown(&self.command, &self.folder) {
-            tracing::warn!("{}: no word of its command names a file of its own: name them in `depends_on`", self.id);
+            tracing::warn!(
+                "{}: its command names no file, so that a change of the program is not noticed; list its files in `depends_on`",
+                self.id
+            );
             text += " (its files are not known)";
         }
         let imports = imports::of(&self.command, &own, &self.folder, site);

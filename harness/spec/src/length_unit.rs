@@ -172,6 +172,10 @@ mod tests {
 
     /// A room of 16.4 x 13.1 x 9.2 of a unit, with the luminaire in the ceiling's plane and a point on a desk.
     fn room(unit: &str, factor: f64) -> Case {
+        read(unit, factor).unwrap()
+    }
+
+    fn read(unit: &str, factor: f64) -> Result<Case, crate::SpecError> {
         let folder = tempfile::tempdir().unwrap();
         let lamp = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reference/luminaires/isotropic.ies");
         let [x, y, z, desk] = [16.4, 13.1, 9.2, 2.5].map(|length| length * factor);
@@ -191,7 +195,15 @@ mod tests {
         );
         let path = folder.path().join("spec.yaml");
         std::fs::write(&path, text).unwrap();
-        Case::load(&path).unwrap()
+        Case::load(&path)
+    }
+
+    #[test]
+    fn a_unit_by_its_whole_name_is_answered_with_its_symbol() {
+        for (word, symbol) in [("feet", "ft"), ("Inches", "in"), ("metres", "m"), ("millimeters", "mm")] {
+            let message = read(&format!("unit: {word}\n"), 1.0).unwrap_err().to_string();
+            assert!(message.contains(&format!("did you mean `{symbol}`?")), "{message}");
+        }
     }
 
     #[test]

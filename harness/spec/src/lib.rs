@@ -279,7 +279,7 @@ fn meant_key(message: &str) -> Option<&str> {
 }
 
 /// Words for keys and procedures that users try first, each with the name in specs.
-const SYNONYMS: [(&str, &str); 18] = [
+const SYNONYMS: [(&str, &str); 27] = [
     ("ugr", "unified_glare_rating"),
     ("glare", "unified_glare_rating"),
     ("illuminance", "total_illuminance"),
@@ -298,6 +298,15 @@ const SYNONYMS: [(&str, &str); 18] = [
     ("ies", "photometry"),
     ("position", "at_m"),
     ("rotation", "rotate_deg"),
+    ("metres", "m"),
+    ("meters", "m"),
+    ("millimetres", "mm"),
+    ("millimeters", "mm"),
+    ("centimetres", "cm"),
+    ("centimeters", "cm"),
+    ("feet", "ft"),
+    ("foot", "ft"),
+    ("inches", "in"),
 ];
 
 /// The known name that is another word for this one.

@@ -19,31 +19,31 @@ use luxproof_process::slots::Slots;
 pub enum CacheMissPolicy {
     /// It asks the engine at once.
     #[default]
-    Engines,
+    AskEngine,
     /// It asks the engine for these readings only; others stay open.
-    Only { wanted: Arc<BTreeSet<Key>>, failures: Failures },
+    AskFor { wanted: Arc<BTreeSet<Key>>, failures: Failures },
     /// The reading stays open, so that another process or machine may take it.
-    Nobody,
+    LeaveOpen,
 }
 
 impl CacheMissPolicy {
     /// Whether the reader may ask the engine for a reading.
     pub(super) fn admits(&self, key: &Key) -> bool {
         match self {
-            Self::Engines => true,
-            Self::Only { wanted, .. } => wanted.contains(key),
-            Self::Nobody => false,
+            Self::AskEngine => true,
+            Self::AskFor { wanted, .. } => wanted.contains(key),
+            Self::LeaveOpen => false,
         }
     }
 
     /// Whether other processes read, too: a failure that they stored counts as an answer.
     pub(super) const fn is_shared(&self) -> bool {
-        !matches!(self, Self::Engines)
+        !matches!(self, Self::AskEngine)
     }
 
     /// Whether a failure is stored as the answer.
     pub(super) const fn keeps_failures(&self) -> bool {
-        matches!(self, Self::Only { failures: Failures::Kept, .. })
+        matches!(self, Self::AskFor { failures: Failures::Kept, .. })
     }
 }
 

@@ -293,7 +293,7 @@ mod tests {
         assert_eq!(lab.read(&job).1.len(), 1);
         assert_eq!(meters_of(lab.read(&larger).1), ["m[0] m[1]"]);
         // Processes that share the work take what the others found.
-        let shared = Reader { asking: CacheMissPolicy::Nobody, ..lab.reader() };
+        let shared = Reader { asking: CacheMissPolicy::LeaveOpen, ..lab.reader() };
         assert!(lab.read_in(&shared, &job).1.is_empty());
     }
 

@@ -59,7 +59,8 @@ struct FoundAnswer {
 impl Reader {
     /// A reader that works in this process and stores neither readings nor files.
     pub fn bare(site: &EngineRoot, machine: Arc<Machine>) -> Self {
-        let (isolation, asking, asked) = (Isolation::InProcess, CacheMissPolicy::Engines, RequestedReadings::default());
+        let (isolation, asking, asked) =
+            (Isolation::InProcess, CacheMissPolicy::AskEngine, RequestedReadings::default());
         Self {
             site: site.clone(),
             out: None,

@@ -77,7 +77,7 @@ pub(super) fn report_from(
     }
     let options = Options {
         cache: Some(Cache::at(cache)),
-        asking: CacheMissPolicy::Nobody,
+        asking: CacheMissPolicy::LeaveOpen,
         ..audited.options(site, trust, out_folder(&audited.selected))
     };
     let (report, _claim) = luxproof_audit::run_and_hold(&audited.selected.specs, &options).map_err(not_audited)?;

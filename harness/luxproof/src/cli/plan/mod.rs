@@ -84,11 +84,11 @@ const FORM: u32 = 1;
 #[derive(Debug, Serialize, Deserialize)]
 struct Workload {
     luxproof: u32,
-    /// What is audited and how; paths count from where it was planned.
+    /// What is audited and how; paths are relative to the folder where it was planned.
     asked: AskedOfPlan,
-    /// All that is asked for by now. Further looks follow from what is read: plan again when everything has been.
+    /// The readings requested so far. Further stages follow from their values: plan again when all have been taken.
     jobs: Vec<Node>,
-    /// Those that nobody has read, packed.
+    /// The jobs that are still open, in groups that run together.
     groups: Vec<Group>,
 }
 
@@ -155,7 +155,7 @@ pub(super) fn plan(args: &PlanArgs, site: &EngineRoot, cache: &Cache, trust: Tru
         return Ok(Exit::Passed);
     }
     let options = Options {
-        asking: CacheMissPolicy::Nobody,
+        asking: CacheMissPolicy::LeaveOpen,
         jobs: threads,
         cache: Some(cache.clone()),
         ..args.audited.options(site, trust, PathBuf::new())
@@ -202,7 +202,7 @@ pub(super) fn read(args: &ReadArgs, site: &EngineRoot, cache: &Cache, trust: Tru
     let wanted: Arc<BTreeSet<Key>> = Arc::new(nodes.iter().map(|node| node.id.clone()).collect());
     let cases = nodes.iter().flat_map(|node| node.cases.clone()).collect();
     let failures = if args.give_up { Failures::Kept } else { Failures::TriedAgain };
-    let asking = CacheMissPolicy::Only { wanted, failures };
+    let asking = CacheMissPolicy::AskFor { wanted, failures };
     let threads = nodes.iter().map(|node| node.threads).max().unwrap_or(1);
     // The plan may come from a stranger, who does not know this machine and may want to harm it.
     let threads = if trust == Trust::Own { threads } else { threads.min(process::cores()) };
