@@ -431,6 +431,18 @@ mod tests {
     }
 
     #[test]
+    fn no_luminaire_crosses_the_ceiling() {
+        for seed in 0..500 {
+            let (scene, _) = room::draw_scene(seed, 1);
+            let ceiling_m = scene.room.map_or(0.0, |room| room.size_m.z);
+            for luminaire in &scene.luminaires {
+                let top_m = luminaire.position_m.z + luminaire.photometry.opening.reach_m(glam::DVec3::Z);
+                assert!(top_m <= ceiling_m, "{seed}: {top_m} m under {ceiling_m} m");
+            }
+        }
+    }
+
+    #[test]
     fn a_wrong_reading_is_reported_and_one_that_is_certified_wrongly_is_cleared() {
         let mut room = SolvedRoom::solve(7, 1, 0.1).unwrap();
         room.truth[5] = CertifiedReading::sampled(2.0 * room.truth[5].lux, 1e-9, CERTIFIER_FREEDOM);
