@@ -81,7 +81,7 @@ impl Cause {
             "turned" | "isotropic" | "averaged" | "extrapolated" | "unrotated" | "rotated-back" | "area-as-point"
             | "meter-flipped" | "meters-up" | "two-sided" | "normals-ignored" | "cosine-missing" | "cosine-doubled"
             | "place" | "turn" | "tilt" | "one-table" | "one-table-scaled" | "one-plane" | "gamma-flipped"
-            | "gamma-off" | "frame" | "axes" | "coordinates" | "normals" | "places" | "angles" | "lookup" | "nodes"
+            | "gamma-off" | "frame" | "axes" | "coordinates" | "normals" | "places" | "angles" | "lookup"
             | "emission" => Aspect::Orientation,
             id if id.starts_with("c-") => Aspect::Orientation,
             "upside-down"

@@ -79,13 +79,14 @@ impl EngineReadings {
         Some(sheet)
     }
 
-    /// The readings that have information.
-    fn informative(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.read.len()).filter(|k| self.uncertainty[*k].is_finite())
+    /// The readings that have information about a prediction: it is blank where it does not know the value.
+    fn informative<'a>(&'a self, predicted: &'a [f64]) -> impl Iterator<Item = usize> + 'a {
+        (0..self.read.len()).filter(|k| self.uncertainty[*k].is_finite() && !predicted[*k].is_nan())
     }
 
+    /// The number of readings that have information.
     pub fn count(&self) -> usize {
-        self.informative().count()
+        self.informative(&self.right).count()
     }
 
     /// The same readings for rough predictions.
@@ -132,7 +133,13 @@ impl EngineReadings {
     }
 
     pub fn chi_squared(&self, predicted: &[f64]) -> f64 {
-        self.informative().map(|k| ((self.read[k] - predicted[k]) / self.sigma(k, predicted[k])).powi(2)).sum()
+        let squares = self.informative(predicted).map(|k| {
+            let residual = (self.read[k] - predicted[k]) / self.sigma(k, predicted[k]);
+            residual * residual
+        });
+        let (sum, compared) = squares.fold((0.0, 0), |(sum, compared), square| (sum + square, compared + 1));
+        // A blank counts as much as a right prediction does on average.
+        sum + (self.count() - compared) as f64
     }
 
     /// Assesses how a prediction agrees with the readings.
@@ -142,7 +149,7 @@ impl EngineReadings {
             return Agreement::Explained(chi_squared);
         }
         let mut tolerated_chi_squared = 0.0;
-        for k in self.informative() {
+        for k in self.informative(predicted) {
             let residual = self.read[k] - predicted[k];
             let (allowed, sigma) = (self.allowed(k, predicted[k]), self.sigma(k, predicted[k]));
             if residual.abs() > allowed + SCATTER_SIGMAS * sigma {
@@ -156,7 +163,10 @@ impl EngineReadings {
 
     /// Residuals in widths, by which a fit weights them.
     pub fn residuals<'a>(&'a self, predicted: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        self.informative().map(|k| (self.read[k] - predicted[k]) / self.width(k))
+        self.informative(&self.right).map(|k| {
+            let residual = (self.read[k] - predicted[k]) / self.width(k);
+            if residual.is_nan() { 1.0 } else { residual }
+        })
     }
 
     /// The width by which a fit weights a reading, whatever the prediction; passing readings get their tolerance.
@@ -174,7 +184,7 @@ impl EngineReadings {
     /// Sums of products that give the best factor of a prediction: with itself, and with the readings.
     pub fn products(&self, predicted: &[f64]) -> (f64, f64) {
         let (mut square, mut product) = (0.0, 0.0);
-        for k in self.informative() {
+        for k in self.informative(predicted) {
             let width = self.design_effect.sqrt() * self.width(k);
             let (p, r) = (predicted[k] / width, self.read[k] / width);
             square += p * p;
@@ -185,7 +195,7 @@ impl EngineReadings {
 
     /// Counts the readings that distinguish a prediction from the right values.
     pub fn count_telling(&self, predicted: &[f64]) -> usize {
-        self.informative()
+        self.informative(predicted)
             .filter(|k| (predicted[*k] - self.right[*k]).abs() > SCATTER_SIGMAS * self.sigma(*k, predicted[*k]))
             .count()
     }
@@ -193,7 +203,8 @@ impl EngineReadings {
     /// The largest relative distance from a prediction, in percent.
     pub fn worst_percent(&self, predicted: &[f64]) -> f64 {
         let floor = FLOOR_SHARE * maximum(predicted);
-        let distances = self.informative().map(|k| (self.read[k] - predicted[k]).abs() / predicted[k].max(floor));
+        let distances =
+            self.informative(predicted).map(|k| (self.read[k] - predicted[k]).abs() / predicted[k].max(floor));
         100.0 * distances.filter(|x| x.is_finite()).fold(0.0, f64::max)
     }
 }

@@ -11,6 +11,7 @@ use luxproof_scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport
 use luxproof_simulator::Accuracy;
 
 use super::distance_law::DistanceLaw;
+use super::edges;
 use super::radiosity::PatchRadiosity;
 use super::tables;
 use luxproof_spec::procedures::{Target, Task};
@@ -317,7 +318,27 @@ impl Model {
             .sum();
         let light =
             faulty.count_reflected_solutions() * count_work(&faulty.task, sensors, fidelity, faulty.has_moved_meters);
-        Work { right, faulty: sensors + changed_nodes + light }
+        let solutions = if self.may_have_edges(faulty) { edges::SOLUTIONS } else { 1 };
+        Work { right, faulty: sensors + changed_nodes + solutions * light }
+    }
+
+    /// Whether a faulty task takes its direct light from other tables, which have edges where the right ones have none.
+    fn may_have_edges(&self, faulty: &FaultyTask) -> bool {
+        let mut luminaires = faulty.task.scene.luminaires.iter().zip(&self.task.scene.luminaires);
+        let reads_other_tables = luminaires.any(|(other, l)| !Arc::ptr_eq(&other.photometry, &l.photometry));
+        reads_other_tables && self.is_cheap() && is_bare(&faulty.task.scene) && faulty.readouts.is_empty()
+    }
+
+    /// Predicts the readings by target, and leaves those at the edges of a wrong look-up blank: they are NaN.
+    pub fn predict_with_blanks(&self, faulty: &FaultyTask, fidelity: Fidelity) -> Option<Vec<f64>> {
+        let mut readings = self.predict(faulty, fidelity)?;
+        if self.may_have_edges(faulty) {
+            let at_edges = edges::are_at_edges(&faulty.task, faulty.law);
+            for (reading, _) in readings.iter_mut().zip(at_edges).filter(|(_, is_at_edge)| *is_at_edge) {
+                *reading = f64::NAN;
+            }
+        }
+        Some(readings)
     }
 
     /// Predicts the readings by target; `None` where they cannot be predicted.
@@ -589,7 +610,7 @@ impl Law {
     }
 
     /// Adds up the light of all luminaires.
-    fn sum(self, luminaires: &[Luminaire], meter: &Meter) -> f64 {
+    pub(super) fn sum(self, luminaires: &[Luminaire], meter: &Meter) -> f64 {
         let each = luminaires.iter().map(|l| self.illuminance(l, meter));
         if self.counts_brightest_only { each.fold(0.0, f64::max) } else { each.sum() }
     }

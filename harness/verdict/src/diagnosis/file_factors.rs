@@ -9,35 +9,38 @@ use luxproof_scene::Luminaire;
 use super::fault::Fault;
 use luxproof_spec::procedures::Task;
 
-/// A factor on the light of a luminaire; `None` where there is none to get wrong.
-type FactorOf = fn(&Luminaire) -> Option<f64>;
+/// A factor on the light of a luminaire with candela dimmed so far; `None` where there is none to get wrong.
+type FactorOf = fn(&Luminaire, f64) -> Option<f64>;
 
 /// Factors that normalised tables have. A renderer that normalises has one of them, and all luminaires have their own.
-const TABLE_FACTORS: [(&str, FactorOf); 12] = [
-    ("the table is divided by its peak", |l| Some(peak_cd(l)?.recip())),
-    ("the table is divided by its flux", |l| Some(flux_lm(l)?.recip())),
-    ("the table is scaled to a flux of 1000 lm", |l| Some(1000.0 / flux_lm(l)?)),
-    ("the table is scaled to a peak of 1000 cd", |l| Some(1000.0 / peak_cd(l)?)),
-    ("the table is divided by its value at the nadir", |l| Some(nadir_cd(l)?.recip())),
-    ("the table is scaled by flux over peak", |l| Some(flux_lm(l)? / peak_cd(l)?)),
-    ("the table is scaled by peak over flux", |l| Some(peak_cd(l)? / flux_lm(l)?)),
+const TABLE_FACTORS: [(&str, FactorOf); 8] = [
+    ("the table is divided by its peak", |l, dimming| Some(peak_cd(l, dimming)?.recip())),
+    ("the table is divided by its flux", |l, dimming| Some(flux_lm(l, dimming)?.recip())),
+    ("the table is divided by its value at the nadir", |l, dimming| Some(nadir_cd(l, dimming)?.recip())),
+    ("the table is scaled by flux over peak", |l, dimming| Some(flux_lm(l, dimming)? / peak_cd(l, dimming)?)),
+    ("the table is scaled by peak over flux", |l, dimming| Some(peak_cd(l, dimming)? / flux_lm(l, dimming)?)),
     ("the table is scaled by its flux", flux_lm),
     ("the table is scaled by its peak", peak_cd),
-    ("the table is divided by its mean intensity, flux/(4 pi)", |l| Some(4.0 * PI / flux_lm(l)?)),
-    ("the table is scaled by lamp lumens over its flux", |l| Some(lamp_lumens(l)? / flux_lm(l)?)),
-    ("the table is scaled by flux/(pi peak)", |l| Some(flux_lm(l)? / (PI * peak_cd(l)?))),
+    ("the table is scaled by lamp lumens over its flux", |l, dimming| Some(lamp_lumens(l)? / flux_lm(l, dimming)?)),
+];
+/// Multiples of these by numbers that programs use.
+const TABLE_MULTIPLES: [(&str, FactorOf); 4] = [
+    ("the table is scaled to a flux of 1000 lm", |l, dimming| Some(1000.0 / flux_lm(l, dimming)?)),
+    ("the table is scaled to a peak of 1000 cd", |l, dimming| Some(1000.0 / peak_cd(l, dimming)?)),
+    ("the table is divided by its mean intensity, flux/(4 pi)", |l, dimming| Some(4.0 * PI / flux_lm(l, dimming)?)),
+    ("the table is scaled by flux/(pi peak)", |l, dimming| Some(flux_lm(l, dimming)? / (PI * peak_cd(l, dimming)?))),
 ];
 
-fn peak_cd(luminaire: &Luminaire) -> Option<f64> {
-    Some(luminaire.photometry.distribution.max_intensity().value()).filter(|peak| *peak > 0.0)
+fn peak_cd(luminaire: &Luminaire, dimming: f64) -> Option<f64> {
+    Some(dimming * luminaire.photometry.distribution.max_intensity().value()).filter(|peak| *peak > 0.0)
 }
 
-fn flux_lm(luminaire: &Luminaire) -> Option<f64> {
-    Some(luminaire.photometry.distribution.flux().value()).filter(|flux| *flux > 0.0)
+fn flux_lm(luminaire: &Luminaire, dimming: f64) -> Option<f64> {
+    Some(dimming * luminaire.photometry.distribution.flux().value()).filter(|flux| *flux > 0.0)
 }
 
-fn nadir_cd(luminaire: &Luminaire) -> Option<f64> {
-    Some(luminaire.photometry.distribution.intensity(0.0, 0.0).value()).filter(|candela| *candela > 0.0)
+fn nadir_cd(luminaire: &Luminaire, dimming: f64) -> Option<f64> {
+    Some(dimming * luminaire.photometry.distribution.intensity(0.0, 0.0).value()).filter(|candela| *candela > 0.0)
 }
 
 fn lamp_lumens(luminaire: &Luminaire) -> Option<f64> {
@@ -47,9 +50,15 @@ fn lamp_lumens(luminaire: &Luminaire) -> Option<f64> {
 /// Factors on luminaires that follow from their tables or their files.
 pub(super) fn luminaire_factors(cases: &[&[Task]]) -> Vec<Fault> {
     let mut all = vec![];
-    for (what, factor) in TABLE_FACTORS {
-        all.push(factor_fault(what.to_owned(), factor));
-        all.push(factor_fault(format!("{what}, and all by factor {{0:}}"), factor).with_free_factor());
+    // Adapters get tables that are dimmed already.
+    for is_dimmed in [false, true] {
+        for (what, factor) in TABLE_FACTORS.into_iter().chain(TABLE_MULTIPLES) {
+            all.push(factor_fault(what.to_owned(), dimmed(factor, is_dimmed)));
+        }
+        for (what, factor) in TABLE_FACTORS {
+            let scaled = factor_fault(format!("{what}, and all by factor {{0:}}"), dimmed(factor, is_dimmed));
+            all.push(scaled.with_free_factor());
+        }
     }
     let luminaires = cases.iter().flat_map(|tasks| tasks.iter()).flat_map(|t| &t.scene.luminaires);
     let fields = luminaires.flat_map(|l| file_fields(&l.photometry)).map(|(field, _)| field).unique();
@@ -59,6 +68,11 @@ pub(super) fn luminaire_factors(cases: &[&[Task]]) -> Vec<Fault> {
         all.push(factor_fault(format!("{field} of the file is applied twice"), move |l| field_of(l, field)));
     }
     all
+}
+
+/// The factor of a table as it is in the file, or as dimmed as the luminaire is.
+fn dimmed(factor: FactorOf, is_dimmed: bool) -> impl Fn(&Luminaire) -> Option<f64> + Send + Sync + Copy {
+    move |l| factor(l, if is_dimmed { l.flux_scale } else { 1.0 })
 }
 
 fn factor_fault(what: String, factor: impl Fn(&Luminaire) -> Option<f64> + Send + Sync + Copy + 'static) -> Fault {

@@ -188,13 +188,18 @@ fn lookup_faults() -> Vec<Fault> {
         luminaire_fault("lookup", "directions in radians are looked up in a table in degrees", look_up_radians),
         luminaire_fault("lookup", "the table is dark at its last gamma itself", darken_last_gamma),
     ];
-    for (goes_on, beyond) in
-        [("goes round", Beyond::Closed), ("is dark", Beyond::Dark), ("is as at its end", Beyond::Nearest)]
-    {
-        let what = "between the table's angles a cubic through four neighbours, by their numbers, is drawn, not a straight line";
-        all.push(Fault::new("lookup", format!("{what}; beyond its ends it {goes_on}"), move |faulty, _| {
-            faulty.change_luminaires(|l| draw_cubics(l, beyond))
-        }));
+    for (drawn, in_c) in [("", true), (" in gamma", false)] {
+        for (goes_on, beyond) in
+            [("goes round", Beyond::Closed), ("is dark", Beyond::Dark), ("is as at its end", Beyond::Nearest)]
+        {
+            let what = format!(
+                "between the table's angles{drawn} a cubic through four neighbours, by their numbers, is drawn, not a \
+                 straight line; beyond its ends it {goes_on}"
+            );
+            all.push(Fault::new("lookup", what, move |faulty, _| {
+                faulty.change_luminaires(|l| draw_cubics(l, in_c, beyond))
+            }));
+        }
     }
     let curves: [(&str, Curve); 2] = [
         ("half a wave of a cosine", |v| 0.5 - 0.5 * (std::f64::consts::PI * v).cos()),

@@ -12,7 +12,7 @@ use super::faults::{
 };
 use super::faulty_task::FaultyTask;
 use super::laws::law_kinds;
-use super::lookups::lookup_kinds;
+use super::lookups::{GAMMA_OFF, gamma_shift, lookup_kinds};
 use super::readouts::readout_kinds;
 use super::tables::{is_axial, keep_first_plane, raise_candela, shift_gamma};
 use luxproof_spec::procedures::Task;
@@ -45,10 +45,6 @@ fn tilt_angle() -> Parameter {
 fn turn_angle() -> Parameter {
     let starts = (-5..=6).map(|k| 30.0 * f64::from(k)).collect();
     Parameter { starts, period: Some(360.0), ..tilt_angle() }
-}
-
-fn gamma_shift() -> Parameter {
-    Parameter::new(" degrees", 0.0, 0.05, (-20.0, 20.0))
 }
 
 fn candela_power() -> Parameter {
@@ -112,7 +108,7 @@ fn texture_kinds() -> Vec<Fault> {
     for loses_planes in [false, true] {
         let prefix = if loses_planes { "only the plane C 0 is read, " } else { "" };
         let about = if loses_planes { "angles of one plane" } else { "angles" };
-        let off = Fault::new("gamma-off", format!("{prefix}gamma is off by {{0}}"), move |faulty, p| {
+        let off = Fault::new("gamma-off", format!("{prefix}{GAMMA_OFF}"), move |faulty, p| {
             let by = p[0];
             faulty.change_luminaires(|l| (loses_planes && keep_first_plane(l)) | shift_gamma(l, by))
         });

@@ -2,9 +2,16 @@
 
 use super::fault::{Fault, Parameter};
 use super::tables::{
-    EndOfPlanes, Neighbour, continue_planes, interpolate_by_cosine, interpolate_by_logarithm, move_nodes,
-    multiply_by_cosine, scale_gamma, take_neighbours,
+    EndOfGamma, EndOfPlanes, Neighbour, average_planes, continue_planes, interpolate_by_cosine,
+    interpolate_by_logarithm, move_nodes, multiply_by_cosine, read_other_gamma, take_neighbours,
 };
+
+/// A gamma that is looked up some degrees nearer to the nadir.
+pub(super) const GAMMA_OFF: &str = "gamma is off by {0}";
+
+pub(super) fn gamma_shift() -> Parameter {
+    Parameter::new(" degrees", 0.0, 0.05, (-20.0, 20.0))
+}
 
 /// Lists the kinds of look-ups.
 pub(super) fn lookup_kinds() -> Vec<Fault> {
@@ -13,11 +20,13 @@ pub(super) fn lookup_kinds() -> Vec<Fault> {
     all.extend(plane_faults());
     all.push(lookup("candela are interpolated by their logarithms, not linearly", interpolate_by_logarithm));
     all.push(lookup("candela are interpolated by the cosine of gamma, not by gamma", interpolate_by_cosine));
-    let scaled = Fault::new("lookup", "gamma is looked up {0} times as large as it is", |faulty, p| {
-        let factor = p[0];
-        faulty.change_luminaires(|l| scale_gamma(l, factor))
-    });
-    all.push(scaled.about("scale of gamma").with_parameters([Parameter::new("", 1.0, 0.01, (0.1, 10.0))]));
+    for is_full_circle in [false, true] {
+        let what = "light is the mean of the table's planes, each counted once, in every C plane";
+        all.push(Fault::new("lookup", what, move |faulty, _| {
+            faulty.change_luminaires(|l| average_planes(l, is_full_circle))
+        }));
+    }
+    all.extend(gamma_faults());
     let cosine =
         Fault::new("emission", "candela are multiplied by the cosine of gamma to the power of {0}", |faulty, p| {
             let power = p[0];
@@ -29,6 +38,24 @@ pub(super) fn lookup_kinds() -> Vec<Fault> {
 
 fn lookup(what: &str, change: fn(&mut luxproof_scene::Luminaire) -> bool) -> Fault {
     Fault::new("lookup", what, move |faulty, _| faulty.change_luminaires(change))
+}
+
+/// Another gamma is looked up; each with the ways in which programs treat what lies beyond the table.
+fn gamma_faults() -> Vec<Fault> {
+    let mut all = vec![];
+    for end in [EndOfGamma::Dark, EndOfGamma::WithinSphere, EndOfGamma::WithinTable] {
+        let scaled = Fault::new("lookup", "gamma is looked up {0} times as large as it is", move |faulty, p| {
+            let factor = p[0];
+            faulty.change_luminaires(|l| read_other_gamma(l, factor, 0.0, end))
+        });
+        all.push(scaled.about("scale of gamma").with_parameters([Parameter::new("", 1.0, 0.01, (0.1, 10.0))]));
+        let off = Fault::new("gamma-off", GAMMA_OFF, move |faulty, p| {
+            let plus_deg = -p[0];
+            faulty.change_luminaires(|l| read_other_gamma(l, 1.0, plus_deg, end))
+        });
+        all.push(off.about("angles").with_parameters([gamma_shift()]));
+    }
+    all
 }
 
 /// Tables without interpolation along one axis or both.

@@ -8,6 +8,7 @@
 mod bounces;
 mod cause;
 mod distance_law;
+mod edges;
 mod engine_readings;
 mod exchange;
 mod fault;
@@ -256,5 +257,7 @@ fn collect_sheets(cases: &[Examined<'_>], chosen: &[usize], subject: &Subject) -
     all
 }
 
+#[cfg(test)]
+mod lookup_tests;
 #[cfg(test)]
 mod tests;

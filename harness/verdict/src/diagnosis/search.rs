@@ -340,9 +340,7 @@ impl Search<'_> {
         for &k in open {
             let sheet = &self.sheets[k];
             let task = &self.catalogue.models[sheet.model].task;
-            let shape = shape::find_one_plane(task, sheet)
-                .or_else(|| shape::find_node_lookup(task, sheet))
-                .or_else(|| shape::find_same_everywhere(sheet));
+            let shape = shape::find_one_plane(task, sheet).or_else(|| shape::find_same_everywhere(sheet));
             if let Some((cause, count_of_parameters)) = shape {
                 found.push(ScoredCause {
                     cause,
@@ -375,7 +373,7 @@ impl Search<'_> {
         if !self.pay(self.full, model, is_fine, work) {
             return None;
         }
-        let prediction = faulty.and_then(|f| catalogue.models[model].predict(&f, fidelity));
+        let prediction = faulty.and_then(|f| catalogue.models[model].predict_with_blanks(&f, fidelity));
         catalogue.predicted.lock().insert(key, (work, prediction.clone()));
         prediction
     }
@@ -394,7 +392,7 @@ impl Search<'_> {
         let faulty = fault.apply(model, parameters)?;
         let is_fine = fidelity == Fidelity::Fine && !self.is_cheap(fault, sheet);
         let is_paid = self.pay(set, place, is_fine, model.count_work(&faulty, fidelity));
-        if is_paid { model.predict(&faulty, fidelity) } else { None }
+        if is_paid { model.predict_with_blanks(&faulty, fidelity) } else { None }
     }
 
     /// Predicts with the fault that is being fitted, which a fit asks for many times.

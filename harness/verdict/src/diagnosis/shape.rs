@@ -1,8 +1,7 @@
 //! Shapes that readings share although no known fault explains their values.
 //!
-//! Light is the same in every C plane, or at every meter, or only the table's nodes are read.
+//! Light is the same in every C plane, or at every meter.
 
-use luxproof_photometry::LuminousIntensityDistribution;
 use luxproof_scene::{Luminaire, LuminaireModel, Transport};
 
 use super::cause::{Cause, Evidence};
@@ -15,27 +14,17 @@ const SAME_GAMMA_DEG: f64 = 1e-4;
 const MIN_SPREAD: f64 = 0.02;
 /// Groups of readings that must show a shape.
 const MIN_GROUPS: usize = 2;
-/// Readings between nodes that must show a lookup of nodes.
-const MIN_BETWEEN_NODES: usize = 4;
 
 /// A meter in the frame of the luminaire.
 struct Place {
-    c_deg: f64,
     gamma_deg: f64,
     /// Candela a lux.
     scale: f64,
     k: usize,
 }
 
-impl Place {
-    /// Standard deviation of a reading from a prediction, both in lux.
-    fn distance_sigmas(&self, sheet: &EngineReadings, predicted: f64) -> f64 {
-        ((sheet.read[self.k] - predicted) / sheet.sigma(self.k, predicted)).abs()
-    }
-}
-
 /// The meters of a task of one luminaire that nothing hides.
-fn places<'a>(task: &'a Task, sheet: &EngineReadings) -> Option<(&'a Luminaire, Vec<Place>)> {
+fn places(task: &Task, sheet: &EngineReadings) -> Option<Vec<Place>> {
     let [luminaire] = &task.scene.luminaires[..] else { return None };
     let is_plain = luminaire.model == LuminaireModel::Point && task.scene.obstacles.is_empty();
     if !is_plain || task.transport != Transport::Direct || task.targets.iter().any(|t| t.aspects.len() != 1) {
@@ -45,7 +34,7 @@ fn places<'a>(task: &'a Task, sheet: &EngineReadings) -> Option<(&'a Luminaire, 
     for (k, target) in task.targets.iter().enumerate() {
         places.extend(place(luminaire, k, target).filter(|_| sheet.uncertainty[k].is_finite()));
     }
-    Some((luminaire, places))
+    Some(places)
 }
 
 /// The place of a meter; `None` where it faces away from the luminaire.
@@ -55,73 +44,8 @@ fn place(luminaire: &Luminaire, k: usize, target: &Target) -> Option<Place> {
     let ray = luminaire.orientation.transpose() * offset;
     let cosine = -offset.normalize().dot(meter.normal);
     let gamma_deg = ray.x.hypot(ray.y).atan2(-ray.z).to_degrees();
-    let c_deg = ray.y.atan2(ray.x).to_degrees().rem_euclid(360.0);
     let scale = ray.length_squared() / (cosine * target.aspects[0].weight);
-    (cosine > 0.0).then_some(Place { c_deg, gamma_deg, scale, k })
-}
-
-/// A lookup of nodes that leaves out interpolation in C, in gamma, or in both.
-#[derive(Clone, Copy)]
-struct NodeLookup<'a> {
-    luminaire: &'a Luminaire,
-    table: &'a LuminousIntensityDistribution,
-    in_c: bool,
-    in_gamma: bool,
-}
-
-impl NodeLookup<'_> {
-    /// The illuminance by the node near a meter's direction that agrees best with the reading.
-    fn best_illuminance(&self, place: &Place, sheet: &EngineReadings) -> Option<f64> {
-        let (c_deg, gamma_deg) = (self.table.c_deg(), self.table.gamma_deg());
-        let near_c = if self.in_c { neighbours(c_deg, place.c_deg) } else { vec![place.c_deg] };
-        let near_gamma = if self.in_gamma { neighbours(gamma_deg, place.gamma_deg) } else { vec![place.gamma_deg] };
-        let mut nodes = vec![];
-        for c in near_c {
-            for g in &near_gamma {
-                nodes.push(self.table.intensity(c, *g).value() * self.luminaire.flux_scale / place.scale);
-            }
-        }
-        nodes.into_iter().min_by(|a, b| place.distance_sigmas(sheet, *a).total_cmp(&place.distance_sigmas(sheet, *b)))
-    }
-}
-
-/// The table's angles next to an angle. On a node they are that node and its neighbours, for readers that truncate.
-fn neighbours(angles: &[f64], at: f64) -> Vec<f64> {
-    let last = angles.len() - 1;
-    let range = if let Some(on) = angles.iter().position(|a| (a - at).abs() < SAME_GAMMA_DEG) {
-        on.saturating_sub(1)..=(on + 1).min(last)
-    } else {
-        let above = angles.partition_point(|a| *a <= at - SAME_GAMMA_DEG).min(last);
-        above.saturating_sub(1)..=above
-    };
-    angles[range].to_vec()
-}
-
-/// Finds readings that are all those of a node near their direction, with the number of open parameters.
-pub(super) fn find_node_lookup(task: &Task, sheet: &EngineReadings) -> Option<(Cause, usize)> {
-    let (luminaire, places) = places(task, sheet)?;
-    let table = &luminaire.photometry.distribution.full_circle();
-    for (in_c, in_gamma, what) in [
-        (true, false, "the table is not interpolated in C: every reading is of a plane beside its direction"),
-        (false, true, "the table is not interpolated in gamma: every reading is of an angle beside its direction"),
-        (true, true, "the table is not interpolated: every reading is a node's beside its direction"),
-    ] {
-        let lookup = NodeLookup { luminaire, table, in_c, in_gamma };
-        let (mut chi_squared, mut left, mut before, mut between) = (0.0, 0.0_f64, 0.0_f64, 0);
-        for place in &places {
-            let nearest = lookup.best_illuminance(place, sheet)?;
-            chi_squared += place.distance_sigmas(sheet, nearest).powi(2);
-            let (read, right) = (sheet.read[place.k], sheet.right[place.k]);
-            between += usize::from((nearest - right).abs() > MIN_SPREAD * right);
-            left = left.max(100.0 * (read / nearest - 1.0).abs());
-            before = before.max(100.0 * (read / right - 1.0).abs());
-        }
-        if between >= MIN_BETWEEN_NODES && is_chance(chi_squared, places.len()) {
-            let evidence = Evidence { readings: places.len(), left, before, factor: None };
-            return Some((shape_cause("nodes", "nodes", what, evidence, chi_squared), places.len()));
-        }
-    }
-    None
+    (cosine > 0.0).then_some(Place { gamma_deg, scale, k })
 }
 
 /// Finds readings that are the same at every meter, where the right ones differ.
@@ -151,7 +75,7 @@ pub(super) fn find_same_everywhere(sheet: &EngineReadings) -> Option<(Cause, usi
 /// The light at each gamma stays open, so that the shape shows whatever else is wrong with the plane. The result
 /// comes with the number of these open parameters.
 pub(super) fn find_one_plane(task: &Task, sheet: &EngineReadings) -> Option<(Cause, usize)> {
-    let (_, mut places) = places(task, sheet)?;
+    let mut places = places(task, sheet)?;
     places.sort_by(|a, b| a.gamma_deg.total_cmp(&b.gamma_deg));
     let groups: Vec<&[Place]> = places.chunk_by(|a, b| b.gamma_deg - a.gamma_deg < SAME_GAMMA_DEG).collect();
     let (mut chi_squared, mut left, mut before, mut telling) = (0.0, 0.0_f64, 0.0_f64, 0);

@@ -74,6 +74,20 @@ pub(super) fn average_over_c(luminaire: &mut Luminaire) -> bool {
     replace_distribution(luminaire, axial.ok())
 }
 
+/// Takes for every plane the mean of those listed, whatever part of the circle each stands for: those of the file, or those of the
+/// full circle with both of its ends.
+pub(super) fn average_planes(luminaire: &mut Luminaire, is_full_circle: bool) -> bool {
+    let own = type_c_table(luminaire);
+    let table = if is_full_circle { own.full_circle() } else { own };
+    let count = table.c_deg().len() as f64;
+    let mut row = vec![0.0; table.gamma_deg().len()];
+    for plane in 0..table.c_deg().len() {
+        row.iter_mut().zip(table.plane(plane)).for_each(|(sum, candela)| *sum += candela / count);
+    }
+    !is_axial(luminaire)
+        && replace_distribution(luminaire, LuminousIntensityDistribution::axial(table.gamma_deg().to_vec(), row).ok())
+}
+
 /// Continues the table beyond its first and last gamma with the candela there.
 pub(super) fn extrapolate(luminaire: &mut Luminaire) -> bool {
     let table = &type_c_table(luminaire);
@@ -237,20 +251,21 @@ fn cubic([a, b, c, d]: [f64; 4], x: f64) -> f64 {
     b + 0.5 * x * (c - a + x * (2.0 * a - 5.0 * b + 4.0 * c - d + x * (3.0 * (b - c) + d - a)))
 }
 
-/// Draws cubics between the table's angles through four neighbours, by their numbers and not by their angles.
-pub(super) fn draw_cubics(luminaire: &mut Luminaire, beyond: Beyond) -> bool {
+/// Draws cubics between the table's gamma angles, or between its C angles too, through four neighbours, by their numbers and not by
+/// their angles.
+pub(super) fn draw_cubics(luminaire: &mut Luminaire, in_c: bool, beyond: Beyond) -> bool {
     let table = luminaire.photometry.distribution.full_circle();
     let (c, gamma) = (table.c_deg(), table.gamma_deg());
     let last = gamma.len() - 1;
     // A pole mirrors the row, and a circle continues with its second plane.
     let poles = [(gamma[0] == 0.0).then_some(1), (gamma[last] == 180.0).then(|| last - 1)];
     let circle = [Some(c.len() - 2), Some(1)];
-    let (c_deg, gamma_deg) = (fine_angles(c), fine_angles(gamma));
+    let (c_deg, gamma_deg) = (if in_c { fine_angles(c) } else { c.to_vec() }, fine_angles(gamma));
     let planes: Vec<Vec<f64>> = (0..c.len()).map(|k| fine_values(table.plane(k), poles, beyond)).collect();
     let mut rings = vec![];
     for g in 0..gamma_deg.len() {
         let ring: Vec<f64> = planes.iter().map(|plane| plane[g]).collect();
-        rings.push(fine_values(&ring, circle, beyond));
+        rings.push(if in_c { fine_values(&ring, circle, beyond) } else { ring });
     }
     // A cubic may swing below zero, where a reader shows darkness.
     let candela = (0..c_deg.len()).flat_map(|k| rings.iter().map(move |ring| ring[k].max(0.0))).collect();
@@ -471,15 +486,37 @@ pub(super) fn interpolate_by_cosine(luminaire: &mut Luminaire) -> bool {
     replace_by_sources(luminaire, &table, &c, &gamma)
 }
 
-/// Looks up a multiple of gamma; beyond the table's last angle it is dark.
-pub(super) fn scale_gamma(luminaire: &mut Luminaire, factor: f64) -> bool {
+/// What counts where a wrong gamma lies beyond the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum EndOfGamma {
+    Dark,
+    /// The nearest gamma from 0 to 180 degrees; the table may end before.
+    WithinSphere,
+    /// The nearest gamma of the table.
+    WithinTable,
+}
+
+/// Looks up another gamma: a multiple of the right one plus some degrees.
+pub(super) fn read_other_gamma(luminaire: &mut Luminaire, factor: f64, plus_deg: f64, end: EndOfGamma) -> bool {
     let table = luminaire.photometry.distribution.full_circle();
     let gamma_deg = table.gamma_deg();
-    let scaled = gamma_deg.iter().map(|g| g / factor);
-    let is_cut = gamma_deg[gamma_deg.len() - 1] / factor > 180.0;
-    let nodes = sort_angles(scaled.filter(|g| *g <= 180.0).chain(is_cut.then_some(180.0)).collect());
-    let last = gamma_deg[gamma_deg.len() - 1];
-    let candela = sample_nodes(table.c_deg(), &nodes, |c, g| table.intensity(c, (factor * g).min(last)).value());
+    let (first, last) = (gamma_deg[0], gamma_deg[gamma_deg.len() - 1]);
+    // Just beyond the table's ends it may be dark at once.
+    let step = EDGE * (last - first);
+    let images = gamma_deg.iter().copied().chain([first - step, last + step, 0.0, 180.0]);
+    let within = images.map(|g| (g - plus_deg) / factor).filter(|g| (0.0..=180.0).contains(g));
+    let nodes = sort_angles(within.chain([0.0, 180.0]).collect());
+    let candela = sample_nodes(table.c_deg(), &nodes, |c, gamma| {
+        let other = factor * gamma + plus_deg;
+        let taken = match end {
+            EndOfGamma::Dark => other,
+            EndOfGamma::WithinSphere => other.clamp(0.0, 180.0),
+            EndOfGamma::WithinTable => other.clamp(first, last),
+        };
+        // Rounding does not lead out of the table.
+        let is_near_end = (taken - taken.clamp(first, last)).abs() < SAME_ANGLE_DEG;
+        table.intensity(c, if is_near_end { taken.clamp(first, last) } else { taken }).value()
+    });
     replace_nodes(luminaire, table.c_deg().to_vec(), nodes, candela)
 }
 

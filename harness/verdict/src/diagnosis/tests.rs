@@ -74,7 +74,7 @@ fn found(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Vec<Cause>> {
 }
 
 /// All different causes, in one list.
-fn causes(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Cause> {
+pub(super) fn causes(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Cause> {
     let all = found(tasks, read).concat();
     let mut each: Vec<Cause> = vec![];
     for cause in all {
