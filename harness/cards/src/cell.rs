@@ -681,6 +681,11 @@ mod tests {
             reason: "it does not read the file: unsupported type; before that: ies2rad failed".to_owned(),
         };
         assert_eq!(judged(&report), rejected);
+        for recording in &mut report.recordings {
+            recording.failure = Some("loading \"/tmp/me/stock.xml\" (near line 26): unreferenced property".to_owned());
+        }
+        let Standing::NotSupported { reason } = judged(&report) else { panic!("{:?}", judged(&report)) };
+        assert_eq!(reason, "it does not read the file: loading \"stock.xml\" (near line 26): unreferenced property");
         // A parser that crashes on a file refuses nothing.
         report.recordings.iter_mut().for_each(|recording| recording.failure_kind = Some(FailureKind::Crash));
         assert_eq!(judged(&report).headline(), "crashes");

@@ -36,6 +36,9 @@ pub struct CaseEvidence {
     pub engine: EngineName,
     /// Hash of what was measured, independent of names.
     pub content_sha256: String,
+    /// What the engine remarked about its values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Whether `luxproof export` writes a scene of it, with the command that runs it by hand.
     #[serde(default)]
     pub is_exportable: bool,
@@ -199,6 +202,7 @@ impl<'a> ReportIndex<'a> {
             run: run.clone(),
             engine: engine.clone(),
             content_sha256: recording.map(|r| r.content_sha256.clone()).unwrap_or_default(),
+            notes: recording.map(|r| r.notes.iter().map(|note| public_text(note)).collect()).unwrap_or_default(),
             is_exportable: recording.is_some_and(|r| r.command.is_some()) && !record.is_calibration,
             outcome,
         })
@@ -330,11 +334,21 @@ fn failed(kind: Option<FailureKind>, reason: String, capability: &Capability) ->
 /// The last line comes first: there a program says why it ends.
 fn public_text(reason: &str) -> String {
     let lines = reason.lines().filter(|line| !line.starts_with("all its messages are in "));
-    let lines: Vec<&str> = lines.map(without_path).filter(|line| !line.is_empty()).collect();
+    let lines: Vec<String> = lines.map(with_file_names).collect();
+    let lines: Vec<&str> = lines.iter().map(|line| without_path(line)).filter(|line| !line.is_empty()).collect();
     match lines.split_last() {
         Some((last, before)) if !before.is_empty() => format!("{last}; before that: {}", before.join("; ")),
         _ => lines.concat(),
     }
+}
+
+/// A line with the names of files in place of quoted absolute paths.
+fn with_file_names(line: &str) -> String {
+    let mut parts = line.split('"').map(|part| match part.rsplit_once('/') {
+        Some((_, name)) if part.starts_with('/') => name,
+        _ => part,
+    });
+    parts.join("\"")
 }
 
 /// A line up to the first absolute path in it.

@@ -84,7 +84,9 @@ struct Released {
 
 impl Released {
     fn bench(&self, workbench: &JobDir) -> JobDir {
-        JobDir { site: self.known.site(&workbench.site), ..workbench.clone() }
+        let is_reused = self.known.cannot != Some(Cannot::LoadSeveralScenes);
+        let idle = workbench.idle.clone().filter(|_| is_reused);
+        JobDir { site: self.known.site(&workbench.site), idle, ..workbench.clone() }
     }
 
     fn own(&self, error: EngineError) -> EngineError {
@@ -160,6 +162,10 @@ impl Engine for Released {
         let mut measurement = self.inner.read(job, &self.bench(workbench)).map_err(|error| self.own(error))?;
         if self.known.cannot == Some(Cannot::LookUpAsBefore) {
             let note = "beyond the ends of a table it looks up otherwise than the release that the bound was made for";
+            measurement.notes.push(note.to_owned());
+        }
+        if self.known.cannot == Some(Cannot::LoadSeveralScenes) {
+            let note = "each scene has its own process: with several in one process the values are wrong, and others each time";
             measurement.notes.push(note.to_owned());
         }
         Ok(measurement)

@@ -14,6 +14,8 @@ use crate::{
 };
 
 const ROOT: &str = "../../";
+/// Notes of engines that a release lists.
+const LISTED_NOTES: usize = 4;
 /// What reports give as the spec of scenes of known answer.
 const BUILT_IN: &str = "(built in)";
 
@@ -65,6 +67,8 @@ fn release_section(cards: &Cards, renderer: &str, release: &ReleaseEvidence, is_
                 @if !release.cell.missing.is_empty() { "; in no run: " (release.cell.missing.join(", ")) }
             }
             @if let Some(spread) = &release.cell.spread { (spread_line(spread)) }
+            @let notes = release.cases.iter().flat_map(|case| &case.notes).unique().take(LISTED_NOTES).collect_vec();
+            @if !notes.is_empty() { ul.changes aria-label={ "Notes on " (release.release) } { @for note in notes { li { (note) } } } }
             @if release.is_recorded { p.where { "These are recorded values. This release cannot be run again here, so they are not verified." } }
             @if !release.cases.is_empty() {
                 details open[is_newest] {
