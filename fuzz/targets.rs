@@ -19,7 +19,7 @@ use luxproof_trend::history::{History, changes, site};
 pub(crate) type Target = fn(&[u8]);
 
 /// All of them, by the names of their folders of seeds.
-pub(crate) const ALL: [(&str, Target); 13] = [
+pub(crate) const ALL: [(&str, Target); 14] = [
     ("lm63", lm63),
     ("eulumdat", eulumdat),
     ("tm33", tm33),
@@ -33,6 +33,7 @@ pub(crate) const ALL: [(&str, Target); 13] = [
     ("radiance_scene", radiance_scene),
     ("obj_scene", obj_scene),
     ("gltf_scene", gltf_scene),
+    ("usd_scene", usd_scene),
 ];
 
 /// What was read survives being written.
@@ -168,6 +169,11 @@ pub(crate) fn obj_scene(bytes: &[u8]) {
 pub(crate) fn gltf_scene(bytes: &[u8]) {
     scene("any.gltf", bytes);
     scene("any.glb", bytes);
+}
+
+/// A profile that it names may be itself.
+pub(crate) fn usd_scene(bytes: &[u8]) {
+    scene("any.usda", bytes);
 }
 
 /// What is taken of a scene lies in its room and is written as it is; what is refused is refused with the file named.

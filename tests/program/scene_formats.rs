@@ -26,7 +26,20 @@ fn a_spec_is_written_as_usd_and_as_gltf_with_its_own_photometric_file() {
     }
     assert_eq!(folder.read("back/luminaire-0.ies"), LAMP);
     folder.luxproof(&["check", "back/spec.yaml"]).exits(0);
+    // From USD, too.
+    folder
+        .luxproof(&["import", "usd/scene.usda", "--out", "again"])
+        .exits(0)
+        .prints("luminaire: lamp, luminaire-0.ies");
+    let again = folder.read("again/spec.yaml");
+    for line in ["id: \"lamp\"", "at_m: [3, 2, 2.5]", "flux_scale: 0.8", "size_m: [6, 4, 3]"] {
+        assert!(again.contains(line), "{line}: {again}");
+    }
+    assert_eq!(folder.read("again/luminaire-0.ies"), LAMP);
+    folder.luxproof(&["check", "again/spec.yaml"]).exits(0);
     let usd = folder.read("usd/scene.usda");
+    folder.write("usd/binary.usdc", "PXR-USDC");
+    folder.luxproof(&["import", "usd/binary.usdc"]).exits(2).complains("usdcat");
     assert!(usd.contains("def SphereLight \"lamp\"") && usd.contains("float inputs:intensity = 3.2"), "{usd}");
 }
 

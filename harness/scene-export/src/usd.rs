@@ -132,6 +132,7 @@ fn light(luminaire: &Luminaire, name: &str, profile: &str) -> String {
         float inputs:intensity = {intensity}
         bool inputs:normalize = 1
         {shape}
+        float inputs:shaping:cone:angle = 180
         float inputs:shaping:ies:angleScale = 0
         asset inputs:shaping:ies:file = @{profile}@
         bool inputs:shaping:ies:normalize = 0

@@ -116,7 +116,7 @@ fn an_l_shaped_room_is_one_in_three_formats() {
         writeln!(obj, "usemtl {}\nf {}", NAMES[*material].0, places.join(" ")).unwrap();
     }
     let mtl = NAMES.map(|(name, rho)| format!("newmtl {name}\nKd {rho} {rho} {rho}\n")).concat();
-    let options = Options { up: Some(Up::Y), unit_m: 0.001, ..Options::default() };
+    let options = Options { up: Some(Up::Y), unit_m: Some(0.001), ..Options::default() };
     let obj = read_with(&[("a.obj", obj.as_bytes()), ("a.mtl", mtl.as_bytes())], &options).unwrap();
     let glb = read(&[("a.gltf", gltf(mesh(&rad)).as_bytes())]).unwrap();
     for other in [&obj, &glb] {

@@ -16,6 +16,7 @@ mod room_detection;
 mod shell;
 mod summaries;
 mod triangle_soup;
+mod usd;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -51,8 +52,8 @@ pub enum Up {
 pub struct Options {
     /// Which axis is up; as usual in its format where that is not said.
     pub up: Option<Up>,
-    /// Metres a unit.
-    pub unit_m: f64,
+    /// Metres a unit; by default what the scene states, else 1.
+    pub unit_m: Option<f64>,
     /// Reflectances of materials by name, whatever the scene says of them.
     pub reflectances: BTreeMap<String, f64>,
     /// Whether surfaces that are not opaque, diffuse and plain are left out; else they are refused.
@@ -62,7 +63,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { up: None, unit_m: 1.0, reflectances: BTreeMap::new(), leaves_out: false, trust: Trust::Own }
+        Self { up: None, unit_m: None, reflectances: BTreeMap::new(), leaves_out: false, trust: Trust::Own }
     }
 }
 
@@ -87,6 +88,7 @@ enum Format {
     Radiance,
     Obj,
     Gltf,
+    Usd,
 }
 
 impl Format {
@@ -96,6 +98,7 @@ impl Format {
             "rad" => Some(Self::Radiance),
             "obj" => Some(Self::Obj),
             "gltf" | "glb" => Some(Self::Gltf),
+            "usda" | "usd" | "usdc" | "usdz" => Some(Self::Usd),
             _ => None,
         }
     }
@@ -105,6 +108,7 @@ impl Format {
             Self::Radiance => "radiance",
             Self::Obj => "obj",
             Self::Gltf => "gltf",
+            Self::Usd => "usd",
         }
     }
 
@@ -118,17 +122,19 @@ impl Format {
 pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
     let scene = Scene { path, trust: options.trust };
     let format = Format::of(path).ok_or_else(|| {
-        let help = "give a Radiance source (.rad), a Wavefront file (.obj) or glTF 2.0 (.gltf, .glb)";
+        let help = "give a Radiance source (.rad), a Wavefront file (.obj), glTF 2.0 (.gltf, .glb) or USD (.usda)";
         scene.fault(None, "this is no scene by its name", help)
     })?;
     let mut raw = match format {
         Format::Radiance => radiance::read(&scene)?,
         Format::Obj => obj::read(&scene)?,
         Format::Gltf => gltf::read(&scene)?,
+        Format::Usd => usd::read(&scene, options.unit_m)?,
     };
     let chosen = chosen(&raw, options)?;
-    let up = options.up.unwrap_or(format.up());
-    let triangles = placed(&raw, &chosen, up, options.unit_m)?;
+    let up = options.up.or(raw.up).unwrap_or(format.up());
+    let unit_m = options.unit_m.or(raw.unit_m).unwrap_or(1.0);
+    let triangles = placed(&raw, &chosen, up, unit_m)?;
     let soup = Soup::of(&triangles, raw.precision);
     if soup.facets.is_empty() {
         let help = "look at what was left out; --reflectance NAME=0.5 takes a material in";
@@ -139,12 +145,12 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
     let around = around(&soup, |material| &raw.materials[material as usize].name, low, high);
     around.notes.iter().for_each(|note| raw.note(note));
     let lights = std::mem::take(&mut raw.lights);
-    let luminaires = luminaires::luminaires(lights, up, options.unit_m, around.origin_m);
+    let luminaires = luminaires::luminaires(lights, up, unit_m, around.origin_m);
     let summary = ImportSummary {
         scene: path.display().to_string(),
         format: format.name(),
         up: if up == Up::Y { "y" } else { "z" },
-        unit_m: options.unit_m,
+        unit_m,
         triangles: soup.facets.len(),
         materials: taken(&raw, &chosen, &soup, options),
         min_m: low.to_array(),
@@ -290,3 +296,5 @@ fn left_out(raw: &Raw<'_>, chosen: &[Option<f64>]) -> Vec<LeftOut> {
 mod closed_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod usd_tests;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 use luxproof_photometry::{LuminousIntensityDistribution, Photometry, lm63};
 use luxproof_process::printable;
 use serde::Serialize;
@@ -18,6 +18,8 @@ pub(super) struct RawLight {
     pub(super) axes: DMat3,
     pub(super) profile: Profile,
     pub(super) flux_scale: f64,
+    /// Whether its light comes from one point, whatever opening its file states.
+    pub(super) is_point: bool,
 }
 
 /// Where the light of a scene goes.
@@ -54,6 +56,8 @@ pub struct ImportedLuminaire {
     pub rotate_deg: [f64; 3],
     /// Factor on every intensity.
     pub flux_scale: f64,
+    /// Whether its light comes from one point, whatever opening its file states.
+    pub is_point: bool,
 }
 
 /// A luminaire in the summary of an import.
@@ -62,6 +66,17 @@ pub struct LuminaireSummary {
     pub id: String,
     pub photometry: String,
     pub at_m: [f64; 3],
+}
+
+/// How far the axes of a light may be from a rotation, as a part of their length.
+const SAME_AXES: f64 = 1e-6;
+
+/// The rotation of a transform; a scale does not matter to a direction.
+pub(super) fn axes(transform: &DMat4) -> Option<DMat3> {
+    let scaled = DMat3::from_mat4(*transform);
+    let axes = DMat3::from_cols(scaled.x_axis.normalize(), scaled.y_axis.normalize(), scaled.z_axis.normalize());
+    let is_rotation = (axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, SAME_AXES) && axes.determinant() > 0.0;
+    is_rotation.then_some(axes)
 }
 
 /// The most characters of a name.
@@ -84,6 +99,7 @@ pub(super) fn luminaires(lights: Vec<RawLight>, up: Up, unit_m: f64, origin_m: D
             at_m: unit_m * upright(light.position) + origin_m,
             rotate_deg: rotation_deg(orientation),
             flux_scale: light.flux_scale,
+            is_point: light.is_point,
         }
     };
     lights.into_iter().enumerate().map(convert).collect()

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use luxproof_scene::geometry::polygon::Triangulator;
 
+use crate::Up;
 use crate::luminaires::RawLight;
 use luxproof_process::printable;
 use luxproof_spec::{SpecError, Trust};
@@ -91,6 +92,9 @@ pub(super) struct Raw<'a> {
     pub(super) others: Others,
     /// Further notes, each once.
     pub(super) notes: Vec<String>,
+    /// Metres a unit, and which axis is up, where the scene says so.
+    pub(super) unit_m: Option<f64>,
+    pub(super) up: Option<Up>,
     /// What its coordinates are known to, relative to its extent.
     pub(super) precision: f64,
     triangulator: Triangulator,
@@ -138,6 +142,8 @@ impl<'a> Raw<'a> {
             profile_bytes: 0,
             others: Others::new(),
             notes: vec![],
+            unit_m: None,
+            up: None,
             precision,
             triangulator: Triangulator::default(),
         }
@@ -159,6 +165,21 @@ impl<'a> Raw<'a> {
 
     pub(super) fn leave_out(&mut self, what: &'static str, count: usize, line: Option<usize>) {
         self.others.entry(what).or_insert((0, line)).0 += count;
+    }
+
+    /// Adds a light. Each becomes a luminaire with its own file, however often a scene names one profile.
+    pub(super) fn light(&mut self, light: RawLight, line: Option<usize>) -> Result<(), SpecError> {
+        self.profile_bytes = self.profile_bytes.saturating_add(light.profile.bytes());
+        self.lights.push(light);
+        let (luminaires, bytes) = (self.scene.trust.max_luminaires(), self.scene.trust.max_named_bytes());
+        let message = if self.lights.len() > luminaires {
+            format!("more than {luminaires} lights")
+        } else if self.profile_bytes > bytes {
+            format!("the profiles of all lights hold more than {bytes} bytes")
+        } else {
+            return Ok(());
+        };
+        Err(self.scene.fault(line, message, "leave lights out, or import it without --untrusted if it is yours"))
     }
 
     /// Counts a surface of a material.

@@ -12,7 +12,7 @@ use crate::luminaires::LuminaireSummary;
 #[derive(Debug, Serialize)]
 pub struct ImportSummary {
     pub scene: String,
-    /// `radiance`, `obj` or `gltf`.
+    /// `radiance`, `obj`, `gltf` or `usd`.
     pub format: &'static str,
     /// Which of the scene's axes is up.
     pub up: &'static str,

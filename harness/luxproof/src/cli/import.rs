@@ -21,18 +21,18 @@ use luxproof_spec::{Case, Trust, find_lints, suite};
 
 #[derive(Debug, Args)]
 pub(super) struct ImportArgs {
-    /// A Radiance source (.rad), a Wavefront file (.obj) or glTF 2.0 (.gltf, .glb)
+    /// A Radiance source (.rad), a Wavefront file (.obj), glTF 2.0 (.gltf, .glb) or USD (.usda)
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Folder of the spec and its meshes [default: the scene's name]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// The axis that points up [default: y for glTF, else z]
+    /// The axis that points up [default: y for glTF, as USD states it, else z]
     #[arg(long, value_enum, value_name = "AXIS")]
     up: Option<Up>,
-    /// Metres per unit of the scene
-    #[arg(long, value_name = "M", default_value = "1", value_parser = unit)]
-    unit: f64,
+    /// Metres per unit of the scene [default: as USD states it, else 1]
+    #[arg(long, value_name = "M", value_parser = unit)]
+    unit: Option<f64>,
     /// Set the diffuse reflectance of a material; may be given several times
     #[arg(long, value_name = "NAME=RHO")]
     reflectance: Vec<ReflectanceOption>,
@@ -160,11 +160,13 @@ fn with_luminaires(text: String, luminaires: &[ImportedLuminaire]) -> String {
     };
     let Some((_, tail)) = rest.split_once("\nmeters:\n") else { return text };
     let mut lines = String::new();
-    for ImportedLuminaire { id, file, at_m, rotate_deg: [azimuth, tilt, roll], flux_scale, .. } in luminaires {
+    for ImportedLuminaire { id, file, at_m, rotate_deg: [azimuth, tilt, roll], flux_scale, is_point, .. } in luminaires
+    {
         let [x, y, z] = at_m.to_array();
+        let model = if *is_point { "    model: point\n" } else { "" };
         lines += &format!(
             "  - id: {id}\n    photometry: {file}\n    at_m: [{x}, {y}, {z}]\n    \
-             rotate_deg: {{azimuth: {azimuth}, tilt: {tilt}, roll: {roll}}}\n    flux_scale: {flux_scale}\n    model: point\n",
+             rotate_deg: {{azimuth: {azimuth}, tilt: {tilt}, roll: {roll}}}\n    flux_scale: {flux_scale}\n{model}",
             id = serde_json::Value::from(id.as_str()),
         );
     }

@@ -1,16 +1,13 @@
 //! Lights of `EXT_lights_ies`, and points of `KHR_lights_punctual`.
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat4, DVec3};
 
 use super::Reader;
 use super::buffers::uri_bytes;
 use super::document::{LightOf, Node};
-use crate::luminaires::{Profile, RawLight};
+use crate::luminaires::{Profile, RawLight, axes};
 use crate::raw::luminous;
 use luxproof_spec::SpecError;
-
-/// How far the axes of a light may be from a rotation, as a part of their length.
-const SAME_AXES: f64 = 1e-6;
 
 impl Reader<'_, '_> {
     /// Takes the lights of a node, or says why not.
@@ -24,25 +21,12 @@ impl Reader<'_, '_> {
                 continue;
             };
             let position = transform.transform_point3(DVec3::ZERO);
-            self.raw.profile_bytes = self.raw.profile_bytes.saturating_add(profile.bytes());
-            self.raw.lights.push(RawLight { name: node.name.clone(), position, axes, profile, flux_scale });
-            self.check_limits(k)?;
+            self.raw.light(
+                RawLight { name: node.name.clone(), position, axes, profile, flux_scale, is_point: true },
+                None,
+            )?;
         }
         Ok(())
-    }
-
-    /// Each light becomes a luminaire with its own file, however often a scene names one profile.
-    fn check_limits(&self, k: usize) -> Result<(), SpecError> {
-        let trust = self.raw.scene.trust;
-        let (luminaires, bytes) = (trust.max_luminaires(), trust.max_named_bytes());
-        let message = if self.raw.lights.len() > luminaires {
-            format!("nodes[{k}]: more than {luminaires} lights")
-        } else if self.raw.profile_bytes > bytes {
-            format!("nodes[{k}]: the light profiles of all nodes hold more than {bytes} bytes")
-        } else {
-            return Ok(());
-        };
-        Err(self.raw.scene.fault(None, message, "leave lights out, or import it without --untrusted if it is yours"))
     }
 
     /// The photometric file of a light of `EXT_lights_ies`, and the factor of its intensities.
@@ -82,12 +66,4 @@ impl Reader<'_, '_> {
             }
         }
     }
-}
-
-/// The rotation of a transform; a scale does not matter to a light.
-fn axes(transform: &DMat4) -> Option<DMat3> {
-    let scaled = DMat3::from_mat4(*transform);
-    let axes = DMat3::from_cols(scaled.x_axis.normalize(), scaled.y_axis.normalize(), scaled.z_axis.normalize());
-    let is_rotation = (axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, SAME_AXES) && axes.determinant() > 0.0;
-    is_rotation.then_some(axes)
 }
