@@ -11,7 +11,7 @@ use luxproof_scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
 use super::distance_law::DistanceLaw;
 use super::fault::{Fault, Parameter};
-use super::faulty_task::{FaultyTask, Law, Order, Readout};
+use super::faulty_task::{FaultyTask, Law, Order, Readout, Sequence};
 use super::tables::{
     average_over_c, extrapolate, is_axial, keep_first_plane, make_isotropic, raise_candela, remap,
     replace_distribution, turn_behind,
@@ -145,24 +145,45 @@ fn readout_faults() -> Vec<Fault> {
     // A clamp starts at the brightest reading, so it has no start here.
     let level = Parameter { unit: " lx", starts: vec![], step: 1e-3, range: (0.0, f64::MAX), period: None };
     let offset = Parameter { unit: " lx", starts: vec![0.0], step: 1e-3, range: (0.0, f64::MAX), period: None };
-    vec![
+    let mut all = vec![
         readout_fault("clamp", "highlights are cut off at {0}", |p| Readout::AtMost(p[0])).with_parameters([level]),
         readout_fault("offset", "{0} are added to every reading", |p| Readout::Plus(p[0])).with_parameters([offset]),
         readout_fault("half-float", "half-precision numbers: what is above 65504 is lost", |_| {
             Readout::AtMost(HALF_PRECISION_MAX)
         }),
         readout_fault("dark", "no light at all: every reading is zero", |_| Readout::AtMost(0.0)),
-        readout_fault("reversed", "the meters of a set are read in the reverse order", |_| {
-            Readout::Order(Order::Reversed)
-        }),
-        readout_fault("next", "every meter reads what the next of its set should", |_| Readout::Order(Order::Next)),
-        readout_fault("previous", "every meter reads what the one before it should", |_| {
-            Readout::Order(Order::Previous)
-        }),
-        readout_fault("exchanged", "rows and columns of grids of meters are exchanged", |_| {
-            Readout::Order(Order::Exchanged)
-        }),
-    ]
+    ];
+    all.extend(order_faults());
+    all
+}
+
+/// Meters that are read in another order: within each set, or within a job of several sets, which an adapter gets as one list.
+fn order_faults() -> Vec<Fault> {
+    let orders = [
+        ("reversed", "meters are read in the reverse order", Order::Reversed),
+        ("next", "every meter reads what the next should", Order::Next),
+        ("previous", "every meter reads what the one before it should", Order::Previous),
+    ];
+    let mut all = vec![];
+    for (id, what, order) in orders {
+        for of in [Sequence::Set, Sequence::Job] {
+            all.push(order_fault(id, what, order, of));
+        }
+    }
+    all.push(order_fault(
+        "exchanged",
+        "rows and columns of grids of meters are exchanged",
+        Order::Exchanged,
+        Sequence::Set,
+    ));
+    all
+}
+
+fn order_fault(id: &'static str, what: &str, order: Order, of: Sequence) -> Fault {
+    Fault::new(id, what, move |faulty, _| {
+        faulty.readouts.push(Readout::Order(order, of));
+        true
+    })
 }
 
 /// A fault that changes readings after they are computed.

@@ -78,7 +78,7 @@ pub enum Readout {
     },
     /// Multiples of a step in lux.
     Step(f64, Rounding),
-    Order(Order),
+    Order(Order, Sequence),
 }
 
 /// How readings become multiples of a step.
@@ -99,6 +99,14 @@ pub enum Order {
     Previous,
     /// The columns of a grid are taken for its rows.
     Exchanged,
+}
+
+/// Which meters are one sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sequence {
+    Set,
+    /// All meters of a job, whatever their sets.
+    Job,
 }
 
 impl Law {
@@ -356,8 +364,8 @@ impl Model {
         }
         let mut readings = sum_aspects(&self.task, &lux);
         for readout in &faulty.readouts {
-            if let Readout::Order(order) = readout {
-                readings = order.apply(&self.task, &readings)?;
+            if let Readout::Order(order, of) = readout {
+                readings = order.apply(*of, &self.task, &readings)?;
             }
         }
         readings.iter().all(|r| r.is_finite()).then_some(readings)
@@ -637,18 +645,18 @@ impl Readout {
             Self::Step(step, Rounding::Nearest) => step * (lux / step).round(),
             Self::Step(step, Rounding::Down) => step * (lux / step).floor(),
             Self::Step(step, Rounding::Up) => step * (lux / step).ceil(),
-            Self::Order(_) => lux,
+            Self::Order(..) => lux,
         }
     }
 }
 
 impl Order {
-    /// Reorders the readings within each set of meters; `None` where no set has such an order.
-    fn apply(self, task: &Task, readings: &[f64]) -> Option<Vec<f64>> {
+    /// Reorders the readings within each sequence of meters; `None` where no sequence has such an order.
+    fn apply(self, of: Sequence, task: &Task, readings: &[f64]) -> Option<Vec<f64>> {
         let mut reordered = vec![];
         let mut changes_any = false;
         let targets = &task.targets[..readings.len()];
-        for set in targets.chunk_by(|a, b| set_name(a) == set_name(b)) {
+        for set in targets.chunk_by(|a, b| of == Sequence::Job || set_name(a) == set_name(b)) {
             let first = reordered.len();
             let places: Vec<DVec3> = set.iter().map(|t| t.meter.position_m).collect();
             for k in 0..set.len() {

@@ -141,6 +141,13 @@ fn other_curves_and_means_of_planes_are_named() {
 }
 
 #[test]
+fn a_cosine_at_the_luminaire_is_named_where_it_is_dark_behind_too() {
+    assert_named(|t, c, g| linear(t, c, g) * g.to_radians().cos().abs(), one, "cosine at the luminaire is applied");
+    let words = "multiplied by the cosine of gamma to the power of 1.0000";
+    assert_named(|t, c, g| linear(t, c, g) * g.to_radians().cos().max(0.0), one, words);
+}
+
+#[test]
 fn a_normalised_table_is_named_with_any_number_and_where_dimming_is_lost() {
     assert_named(linear, |t| 100.0 / t.max_intensity().value(), "divided by its peak, and all by factor 100");
     assert_named(linear, |t| 1.0 / t.flux().value(), "divided by its flux");

@@ -27,12 +27,14 @@ pub(super) fn lookup_kinds() -> Vec<Fault> {
         }));
     }
     all.extend(gamma_faults());
-    let cosine =
-        Fault::new("emission", "candela are multiplied by the cosine of gamma to the power of {0}", |faulty, p| {
+    for is_dark_behind in [false, true] {
+        let what = "candela are multiplied by the cosine of gamma to the power of {0}";
+        let cosine = Fault::new("emission", what, move |faulty, p| {
             let power = p[0];
-            faulty.change_luminaires(|l| multiply_by_cosine(l, power))
+            faulty.change_luminaires(|l| multiply_by_cosine(l, power, is_dark_behind))
         });
-    all.push(cosine.about("cosine of tables").with_parameters([Parameter::new("", 0.0, 0.02, (-2.0, 8.0))]));
+        all.push(cosine.about("cosine of tables").with_parameters([Parameter::new("", 0.0, 0.02, (-2.0, 8.0))]));
+    }
     all
 }
 

@@ -2,7 +2,7 @@
 
 use super::engine_readings::EngineReadings;
 use super::fault::{Fault, Parameter};
-use super::faulty_task::{Readout, Rounding};
+use super::faulty_task::{Model, Readout, Rounding};
 
 /// The fewest different readings that show a common step.
 const MIN_VALUES: usize = 4;
@@ -45,24 +45,37 @@ pub(super) fn readout_kinds() -> Vec<Fault> {
     ]
 }
 
-/// Faults in which all readings are multiples of one step, where those of the sheets are.
-pub(super) fn step_faults(sheets: &[EngineReadings]) -> Vec<Fault> {
-    let Some(step) = sheets.iter().filter(|sheet| sheet.fails).find_map(find_step) else { return vec![] };
+/// Faults in which all readings are multiples of one step, where those of the sheets are, or also at most 255 times the step.
+pub(super) fn step_faults(sheets: &[EngineReadings], models: &[Model]) -> Vec<Fault> {
+    let failing = sheets.iter().filter(|sheet| sheet.fails);
+    let Some(step) = failing.filter_map(|sheet| find_step(lux(sheet, &models[sheet.model]))).next() else {
+        return vec![];
+    };
     let mut all = vec![];
     for (rounding, how) in [(Rounding::Nearest, "rounded to"), (Rounding::Down, "cut to"), (Rounding::Up, "raised to")]
     {
         let what = format!("readings are {how} multiples of {step:.4} lx");
+        let of_8_bits = format!("{what}, at most 255 of them: they have 8 bits");
         all.push(Fault::new("readout", what, move |faulty, _| {
             faulty.readouts.push(Readout::Step(step, rounding));
+            true
+        }));
+        all.push(Fault::new("readout", of_8_bits, move |faulty, _| {
+            faulty.readouts.extend([Readout::Step(step, rounding), Readout::AtMost(255.0 * step)]);
             true
         }));
     }
     all
 }
 
-/// Finds the largest step that all readings of a sheet are multiples of.
-fn find_step(sheet: &EngineReadings) -> Option<f64> {
-    let mut values: Vec<f64> = sheet.read.iter().copied().filter(|read| *read > 0.0).collect();
+/// The illuminance that an engine reads for each reading of a sheet, whatever the reading's unit.
+fn lux(sheet: &EngineReadings, model: &Model) -> Vec<f64> {
+    sheet.read.iter().zip(&model.task.targets).map(|(read, target)| read / target.aspects[0].weight).collect()
+}
+
+/// Finds the largest step that all values are multiples of.
+fn find_step(lux: Vec<f64>) -> Option<f64> {
+    let mut values: Vec<f64> = lux.into_iter().filter(|read| *read > 0.0).collect();
     values.sort_by(f64::total_cmp);
     values.dedup_by(|a, b| (*a - *b).abs() < 1e-4 * *b);
     if values.len() < MIN_VALUES {

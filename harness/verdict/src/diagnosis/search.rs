@@ -268,7 +268,9 @@ impl Search<'_> {
         for fault in &self.catalogue.implementation_faults {
             found.extend(self.score_unfitted(fault));
         }
-        found.extend(step_faults(self.sheets).iter().filter_map(|fault| self.score_unfitted(fault)));
+        found.extend(
+            step_faults(self.sheets, &self.catalogue.models).iter().filter_map(|fault| self.score_unfitted(fault)),
+        );
         found
     }
 

@@ -521,11 +521,16 @@ pub(super) fn read_other_gamma(luminaire: &mut Luminaire, factor: f64, plus_deg:
 }
 
 /// Multiplies candela by a power of the cosine of gamma, in degrees that are fine enough for straight lines.
-pub(super) fn multiply_by_cosine(luminaire: &mut Luminaire, power: f64) -> bool {
+pub(super) fn multiply_by_cosine(luminaire: &mut Luminaire, power: f64, is_dark_behind: bool) -> bool {
     let table = luminaire.photometry.distribution.full_circle();
     let gamma_deg = fine_angles(table.gamma_deg());
     let candela = sample_nodes(table.c_deg(), &gamma_deg, |c, g| {
-        table.intensity(c, g).value() * g.to_radians().cos().abs().max(MIN_COSINE).powf(power)
+        let is_lit = g <= BEHIND_DEG || !is_dark_behind;
+        if is_lit {
+            table.intensity(c, g).value() * g.to_radians().cos().abs().max(MIN_COSINE).powf(power)
+        } else {
+            0.0
+        }
     });
     replace_nodes(luminaire, table.c_deg().to_vec(), gamma_deg, candela)
 }

@@ -184,6 +184,33 @@ fn meters_in_another_order_are_named() {
 }
 
 #[test]
+fn meters_in_the_reverse_order_of_a_job_of_several_sets_are_named() {
+    let mut task = skew(Transport::Direct);
+    for (k, target) in task.targets.iter_mut().enumerate() {
+        target.id = MeterId::new(if k < 5 { "desk" } else { "wall" }, k);
+    }
+    let named = causes(&[task], &|m| m.right.iter().rev().copied().collect());
+    assert_eq!((named.len(), named[0].what.as_str()), (1, "meters are read in the reverse order"), "{named:?}");
+}
+
+#[test]
+fn readings_of_eight_bits_are_named_with_their_step_in_lux() {
+    let mut task = skew(Transport::Direct);
+    // Brighter than 255 lx in part; the intensities of the other task are far larger numbers.
+    task.scene.luminaires[0].flux_scale = 60.0;
+    let mut intensity = task.clone();
+    intensity.procedure = ProcedureId::LuminousIntensity;
+    intensity.quantity = Quantity::LuminousIntensity;
+    intensity.targets.iter_mut().for_each(|t| t.aspects[0].weight = 100.0);
+    let eight_bits = |m: &Model| {
+        let weights = m.task.targets.iter().map(|t| t.aspects[0].weight);
+        m.right.iter().zip(weights).map(|(right, weight)| (right / weight).min(255.0).round() * weight).collect()
+    };
+    let named = causes(&[task, intensity], &eight_bits);
+    assert!(named.len() == 1 && named[0].what.contains("multiples of 1.0000 lx, at most 255"), "{named:?}");
+}
+
+#[test]
 fn two_faults_at_once_are_named_both() {
     let tasks = BOTH.map(skew);
     let all = faults(&[&tasks]);
