@@ -376,7 +376,16 @@ fn wrong(evidence: &[CaseEvidence], spread: Option<&Spread>) -> Option<Standing>
             None => worst.text,
         }
     };
+    let from = from + &also_failing(evidence);
     Some(Standing::Wrong { fault, from, worst: point })
+}
+
+/// The cases of a wrong cell that give no values, as a part of where it is wrong.
+fn also_failing(evidence: &[CaseEvidence]) -> String {
+    let failures: Vec<(FailureKind, Flaw<'_>)> = evidence.iter().filter_map(CaseEvidence::failure).collect();
+    let Some((failure, _)) = failures.first() else { return String::new() };
+    let cases = failures.iter().map(|(_, flaw)| flaw.case.case.as_str()).unique().take(LISTED_CASES).join(", ");
+    format!("; {} in {cases}", failure_words(*failure))
 }
 
 /// The known limit of the public case of a hidden variant. It counts for the case that declares it and for no other.
@@ -739,7 +748,8 @@ mod tests {
         }
         // Wrong light is worse than none.
         let both = [MadeCase::new("a").off(0.5, 0.0), MadeCase::new("b").failing("crash", "signal 11")];
-        assert!(matches!(cell(&both, 1).standing, Standing::Wrong { .. }));
+        let Standing::Wrong { from, .. } = cell(&both, 1).standing else { panic!("{both:?}") };
+        assert_eq!(from, "in 1 of 2 cases: a; worst at floor[0] of a; crashes in b");
     }
 
     #[test]

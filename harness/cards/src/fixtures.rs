@@ -21,7 +21,7 @@ pub(crate) fn capabilities(minimum_cases: usize) -> Capabilities {
 }
 
 /// A case of an engine, as a report has it.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(crate) struct MadeCase {
     case: String,
     hidden: Option<HiddenVariant>,
