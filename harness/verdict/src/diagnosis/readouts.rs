@@ -47,8 +47,8 @@ pub(super) fn readout_kinds() -> Vec<Fault> {
 
 /// Faults in which all readings are multiples of one step, where those of the sheets are, or also at most 255 times the step.
 pub(super) fn step_faults(sheets: &[EngineReadings], models: &[Model]) -> Vec<Fault> {
-    let failing = sheets.iter().filter(|sheet| sheet.fails);
-    let Some(step) = failing.filter_map(|sheet| find_step(lux(sheet, &models[sheet.model]))).next() else {
+    let mut failing = sheets.iter().filter(|sheet| sheet.fails);
+    let Some(step) = failing.find_map(|sheet| find_step(lux(sheet, &models[sheet.model]))) else {
         return vec![];
     };
     let mut all = vec![];
