@@ -106,3 +106,20 @@ fn a_usd_light_has_the_candela_of_its_profile() {
     assert_eq!(text.matches("def Mesh").count(), 7);
     assert_eq!(text.matches('{').count(), text.matches('}').count());
 }
+
+#[test]
+fn a_usd_light_takes_no_name_of_another_prim() {
+    let mut scene = scene();
+    let mut other = scene.luminaires[0].clone();
+    scene.luminaires[0].id = "Materials".into();
+    other.id = "floor".into();
+    scene.luminaires.push(other);
+    let exported = export_scene(&scene, "names", SceneFormat::Usd);
+    let text = file(&exported, "scene.usda");
+    // The prims below the world, indented by four.
+    let names: Vec<&str> =
+        text.lines().filter(|l| l.starts_with("    def ")).map(|l| l.split('"').nth(1).unwrap()).collect();
+    assert_eq!(names.len(), 1 + 7 + 2);
+    let distinct: std::collections::BTreeSet<&str> = names.iter().copied().collect();
+    assert_eq!(distinct.len(), names.len(), "{names:?}");
+}

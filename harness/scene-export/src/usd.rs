@@ -19,17 +19,20 @@ const SPHERE_INTENSITY: f64 = 4.0;
 /// The radius of a sphere that stands for a point, in metres.
 const POINT_RADIUS_M: f64 = 1e-3;
 
+/// The scope of all materials.
+const MATERIALS: &str = "Materials";
+
 /// The layer.
 pub(crate) fn text(scene: &Scene, title: &str) -> String {
     let meshes = meshes(scene);
-    let mut names = PrimNames::default();
+    let mut names = PrimNames([MATERIALS.to_owned()].into());
     let mut text = format!(
         "#usda 1.0\n(\n    defaultPrim = \"World\"\n    doc = {doc}\n    metersPerUnit = 1\n    upAxis = \"Z\"\n)\n\n\
          def Xform \"World\" (\n    kind = \"component\"\n)\n{{\n",
         doc = quoted(&format!("{title}. Metres; intensities in nits, profiles in candela; z is up. By luxproof."))
     );
     let reflectances: Vec<f64> = meshes.iter().map(|mesh| mesh.reflectance).sorted_by(f64::total_cmp).dedup().collect();
-    text += "    def Scope \"Materials\"\n    {\n";
+    text += &format!("    def Scope \"{MATERIALS}\"\n    {{\n");
     for (k, rho) in reflectances.iter().enumerate() {
         text += &material(k, *rho);
     }
@@ -45,7 +48,6 @@ pub(crate) fn text(scene: &Scene, title: &str) -> String {
 }
 
 /// Names of prims, each once.
-#[derive(Default)]
 struct PrimNames(BTreeSet<String>);
 
 impl PrimNames {
