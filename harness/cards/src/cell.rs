@@ -691,7 +691,8 @@ mod tests {
         };
         assert_eq!(judged(&report), rejected);
         for recording in &mut report.recordings {
-            recording.failure = Some("loading \"/tmp/me/stock.xml\" (near line 26): unreferenced property".to_owned());
+            recording.failure =
+                Some("  ^^^^\nloading \u{fffd}\"/tmp/me/stock.xml\" (near line 26): unreferenced property".to_owned());
         }
         let Standing::NotSupported { reason } = judged(&report) else { panic!("{:?}", judged(&report)) };
         assert_eq!(reason, "it does not read the file: loading \"stock.xml\" (near line 26): unreferenced property");

@@ -331,9 +331,10 @@ fn failed(kind: Option<FailureKind>, reason: String, capability: &Capability) ->
 
 /// The message of an engine in one line, without the places of files on the machine that ran it.
 ///
-/// The last line comes first: there a program says why it ends.
+/// The last line comes first: there a program says why it ends. Lines that only underline the one above go, as in Python's tracebacks.
 fn public_text(reason: &str) -> String {
     let lines = reason.lines().filter(|line| !line.starts_with("all its messages are in "));
+    let lines = lines.filter(|line| line.trim().is_empty() || line.contains(|c: char| !matches!(c, '^' | '~' | ' ')));
     let lines: Vec<String> = lines.map(with_file_names).collect();
     let lines: Vec<&str> = lines.iter().map(|line| without_path(line)).filter(|line| !line.is_empty()).collect();
     match lines.split_last() {
@@ -348,7 +349,8 @@ fn with_file_names(line: &str) -> String {
         Some((_, name)) if part.starts_with('/') => name,
         _ => part,
     });
-    parts.join("\"")
+    // What was no UTF-8 says nothing.
+    parts.join("\"").replace(char::REPLACEMENT_CHARACTER, "")
 }
 
 /// A line up to the first absolute path in it.

@@ -44,7 +44,7 @@ pub(super) fn page(cards: &Cards, capability: &Capability, of: &CellEvidence) ->
 
 /// Opens the release that a link names.
 const SCRIPT: &str = "const reveal=()=>{const s=document.getElementById(decodeURIComponent(location.hash.slice(1)));\
-const d=s&&s.querySelector('details');if(d){d.open=true;s.scrollIntoView()}};addEventListener('hashchange',reveal);reveal();";
+const d=s&&(s.closest('details')||s.querySelector('details'));if(d){d.open=true;s.scrollIntoView()}};addEventListener('hashchange',reveal);reveal();";
 
 /// The version of a release, where it says more than its name.
 fn version_text(cards: &Cards, renderer: &str, release: &ReleaseEvidence) -> Option<String> {
@@ -62,6 +62,7 @@ fn release_section(cards: &Cards, renderer: &str, release: &ReleaseEvidence, is_
             p.lead { (minus(&standing.explanation())) }
             @if let Some(version) = version { p.where { "Version: " (version) } }
             p.where {
+                @if !release.cases.is_empty() { a href={ "#" (check_anchor(release)) } { "Commands to check it" } ". " }
                 (release.cell.tested_cases) " of " (plural(release.cell.all_cases, "case")) ", "
                 (plural(release.cell.hidden_variants, "hidden variant")) ", " (plural(release.cell.points, "comparison"))
                 @if !release.cell.missing.is_empty() { "; in no run: " (release.cell.missing.join(", ")) }
@@ -189,11 +190,16 @@ fn points(cards: &Cards, release: &ReleaseEvidence, case: &CaseEvidence) -> Mark
     }
 }
 
+/// The anchor of the commands of a release.
+fn check_anchor(release: &ReleaseEvidence) -> String {
+    format!("check-{}", anchor(&release.release))
+}
+
 /// The runs behind a release, with commands, reports and bundles.
 fn repeat(cards: &Cards, release: &ReleaseEvidence) -> Markup {
     let ids = release.cases.iter().map(|case| &case.run).unique().collect_vec();
     html! {
-        h3 { "Check it" }
+        h3 id=(check_anchor(release)) { "Check it" }
         @for run in cards.runs.iter().filter(|run| ids.contains(&&run.id)) { (run_entry(run, release)) }
     }
 }

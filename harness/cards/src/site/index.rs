@@ -19,13 +19,14 @@ const LISTED_CHANGES: usize = 12;
 
 pub(super) fn page(cards: &Cards) -> Result<Markup, CardsError> {
     let data = release_data(cards)?;
-    let releases: usize = cards.renderers.iter().map(|renderer| renderer.releases.len()).sum();
+    let judged: Vec<&RendererCard> = cards.renderers.iter().filter(|renderer| !renderer.is_own).collect();
+    let releases: usize = judged.iter().map(|renderer| renderer.releases.len()).sum();
     let content = html! {
         header {
             h1 { "What each renderer can be trusted for" }
             p.lead {
                 "Does it read the photometric file, and is the light right? "
-                (plural(cards.renderers.len(), "renderer")) " in " (plural(releases, "release")) ", judged by closed forms and by an "
+                (plural(judged.len(), "renderer")) " in " (plural(releases, "release")) ", judged by closed forms and by an "
                 "independent calculation that states its own error. The worst point of the worst case counts. Each cell leads to its evidence."
             }
             (legend())
