@@ -556,7 +556,7 @@ fn points_of_gltf_become_luminaires_and_other_lights_are_left_out() {
     }
     list[0]["children"].as_array_mut().unwrap().extend([count.into(), (count + 1).into()]);
     document["extensions"]["KHR_lights_punctual"] =
-        serde_json::json!({"lights": [{"type": "point", "intensity": 40.0}, {"type": "spot"}]});
+        serde_json::json!({"lights": [{"type": "point", "intensity": 40.0}, {"type": "directional"}]});
     let text = document.to_string();
     let files = [("scene.gltf", text.as_bytes()), ("luminaire-0.ies", &exported.files[0].bytes)];
     let imported = read(&files).unwrap();
@@ -565,5 +565,43 @@ fn points_of_gltf_become_luminaires_and_other_lights_are_left_out() {
     assert!(point.id == "light-1" && point.at_m.distance(DVec3::new(1.0, 2.0, 2.0)) < 1e-9, "{point:?}");
     let photometry = luxproof_photometry::lm63::parse(&point.bytes).unwrap();
     assert_eq!(photometry.distribution.intensity(77.0, 120.0).value(), 40.0);
-    assert!(imported.summary.left_out.iter().any(|l| l.what.contains("no points") && l.count == 1));
+    assert!(imported.summary.left_out.iter().any(|l| l.what.contains("directional") && l.count == 1));
+}
+
+/// The formula of the extension: full inside, none outside, the square of a straight line in the cosine between.
+#[test]
+fn spots_of_gltf_have_the_intensity_of_their_cones() {
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut scene = random_scene(&mut random);
+    scene.luminaires.clear();
+    let exported = luxproof_scene_export::export_scene(&scene, "spot", luxproof_scene_export::SceneFormat::Gltf);
+    let mut document: serde_json::Value = serde_json::from_slice(&exported.files.last().unwrap().bytes).unwrap();
+    let list = document["nodes"].as_array_mut().unwrap();
+    let count = list.len();
+    for light in 0..4 {
+        list.push(
+            serde_json::json!({"translation": [1, 2, 2], "extensions": {"KHR_lights_punctual": {"light": light}}}),
+        );
+    }
+    list[0]["children"].as_array_mut().unwrap().extend((count..count + 4).map(serde_json::Value::from));
+    document["extensions"]["KHR_lights_punctual"] = serde_json::json!({"lights": [
+        {"type": "spot", "intensity": 500.0, "spot": {"innerConeAngle": 0.3, "outerConeAngle": 0.7}},
+        {"type": "spot", "intensity": 500.0},
+        {"type": "spot", "intensity": 500.0, "spot": {"innerConeAngle": 0.7, "outerConeAngle": 0.3}},
+        {"type": "spot", "intensity": 100.0, "spot": {"innerConeAngle": 0.0, "outerConeAngle": 0.01}},
+    ]});
+    let imported = read(&[("scene.gltf", document.to_string().as_bytes())]).unwrap();
+    assert_eq!(imported.luminaires.len(), 3);
+    for (luminaire, candela, [inner, outer]) in
+        [(0, 500.0, [0.3_f64, 0.7_f64]), (1, 500.0, [0.0, std::f64::consts::FRAC_PI_4]), (2, 100.0, [0.0, 0.01])]
+    {
+        let photometry = luxproof_photometry::lm63::parse(&imported.luminaires[luminaire].bytes).unwrap();
+        for angle in [0.0_f64, 0.004, 0.2, 0.3, 0.4, 0.55, 0.69, 0.75, 1.0, 2.0, 3.0] {
+            let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);
+            let expected = candela * ((angle.cos() - outer.cos()) * scale).clamp(0.0, 1.0).powi(2);
+            let found = photometry.distribution.intensity(20.0, angle.to_degrees()).value();
+            assert!((found - expected).abs() < 3e-4 * candela, "{luminaire} {angle}: {found} {expected}");
+        }
+    }
+    assert!(imported.summary.left_out.iter().any(|l| l.what.contains("spots without a cone") && l.count == 1));
 }

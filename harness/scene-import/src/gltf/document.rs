@@ -144,6 +144,16 @@ pub(super) struct PunctualLight {
     /// In candela.
     pub(super) intensity: Option<f64>,
     pub(super) color: Option<[f64; 3]>,
+    /// Of spots.
+    pub(super) spot: Option<Spot>,
+}
+
+/// The cone of a spot: angles from its axis, in radians.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Spot {
+    pub(super) inner_cone_angle: Option<f64>,
+    pub(super) outer_cone_angle: Option<f64>,
 }
 
 #[derive(Debug, Deserialize)]
