@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use itertools::Itertools;
 use luxproof_engines::fixtures;
 use luxproof_photometry::LuminousIntensityDistribution as Table;
 use luxproof_scene::{Luminaire, Meter, Transport, orientation};
@@ -25,8 +26,8 @@ fn locate(angles: &[f64], at: f64) -> Option<(usize, f64)> {
 fn weighted(table: &Table, c: f64, gamma: f64, part: fn(f64) -> f64) -> f64 {
     let (Some((i, u)), Some((j, v))) = (locate(table.c_deg(), c), locate(table.gamma_deg(), gamma)) else { return 0.0 };
     let (u, v) = (part(u), part(v));
-    let row = |i: usize| (1.0 - v) * table.plane(i)[j] + v * table.plane(i)[j + 1];
-    (1.0 - u) * row(i) + u * row(i + 1)
+    let [here, next] = [i, i + 1].map(|i| (1.0 - v) * table.plane(i)[j] + v * table.plane(i)[j + 1]);
+    (1.0 - u) * here + u * next
 }
 
 fn linear(table: &Table, c: f64, gamma: f64) -> f64 {
@@ -45,13 +46,13 @@ fn half_an_index_on(table: &Table, c: f64, gamma: f64) -> f64 {
 /// Catmull and Rom's cubic along gamma; the first and the last value repeat.
 fn cubic(table: &Table, c: f64, gamma: f64) -> f64 {
     let (Some((i, u)), Some((j, v))) = (locate(table.c_deg(), c), locate(table.gamma_deg(), gamma)) else { return 0.0 };
-    let row = |i: usize| {
+    let [here, next] = [i, i + 1].map(|i| {
         let row = table.plane(i);
         let [a, b, c, d] = [row[j.saturating_sub(1)], row[j], row[j + 1], row[(j + 2).min(row.len() - 1)]];
         let bent = 3.0 * (b - c) + d - a;
         (b + 0.5 * v * (c - a + v * (2.0 * a - 5.0 * b + 4.0 * c - d + v * bent))).max(0.0)
-    };
-    (1.0 - u) * row(i) + u * row(i + 1)
+    });
+    (1.0 - u) * here + u * next
 }
 
 /// The mean of all listed planes.
@@ -83,20 +84,28 @@ fn tasks() -> Vec<Task> {
     std::iter::once(task).chain(free_field.filter(|t| t.scene.obstacles.is_empty())).collect()
 }
 
-/// Reads by a look-up, and each table times a factor. It gets tables of the full circle that are dimmed already.
+/// Reads by a look-up, and each table times a factor.
 fn read(model: &Model, look_up: LookUp, factor: fn(&Table) -> f64) -> Vec<f64> {
-    let illuminance = |l: &Luminaire, meter: &Meter| {
-        let table = l.photometry.distribution.full_circle().scaled(l.flux_scale);
-        let offset = meter.position_m - l.position_m;
-        let ray = l.orientation.transpose() * offset;
-        let c = ray.y.atan2(ray.x).to_degrees().rem_euclid(360.0);
-        let gamma = ray.x.hypot(ray.y).atan2(-ray.z).to_degrees();
-        let cosine = (-offset.dot(meter.normal) / offset.length()).max(0.0);
-        factor(&table) * look_up(&table, c, gamma) * cosine / offset.length_squared()
-    };
-    let sum = |meter: &Meter| model.task.scene.luminaires.iter().map(|l| illuminance(l, meter)).sum::<f64>();
-    let of_target = |t: &Target| t.aspects.iter().map(|a| a.weight * sum(&a.meter)).sum();
-    model.task.targets.iter().map(of_target).collect()
+    let mut read = vec![];
+    for target in &model.task.targets {
+        let mut sum = 0.0;
+        for (aspect, l) in target.aspects.iter().cartesian_product(&model.task.scene.luminaires) {
+            sum += aspect.weight * illuminance(l, &aspect.meter, look_up, factor);
+        }
+        read.push(sum);
+    }
+    read
+}
+
+/// The illuminance by a look-up in the table of the full circle, which is dimmed already, as adapters get it.
+fn illuminance(l: &Luminaire, meter: &Meter, look_up: LookUp, factor: fn(&Table) -> f64) -> f64 {
+    let table = l.photometry.distribution.full_circle().scaled(l.flux_scale);
+    let offset = meter.position_m - l.position_m;
+    let ray = l.orientation.transpose() * offset;
+    let c = ray.y.atan2(ray.x).to_degrees().rem_euclid(360.0);
+    let gamma = ray.x.hypot(ray.y).atan2(-ray.z).to_degrees();
+    let cosine = (-offset.dot(meter.normal) / offset.length()).max(0.0);
+    factor(&table) * look_up(&table, c, gamma) * cosine / offset.length_squared()
 }
 
 #[track_caller]

@@ -202,11 +202,10 @@ fn readings_of_eight_bits_are_named_with_their_step_in_lux() {
     intensity.procedure = ProcedureId::LuminousIntensity;
     intensity.quantity = Quantity::LuminousIntensity;
     intensity.targets.iter_mut().for_each(|t| t.aspects[0].weight = 100.0);
-    let eight_bits = |m: &Model| {
+    let named = causes(&[task, intensity], &|m| {
         let weights = m.task.targets.iter().map(|t| t.aspects[0].weight);
         m.right.iter().zip(weights).map(|(right, weight)| (right / weight).min(255.0).round() * weight).collect()
-    };
-    let named = causes(&[task, intensity], &eight_bits);
+    });
     assert!(named.len() == 1 && named[0].what.contains("multiples of 1.0000 lx, at most 255"), "{named:?}");
 }
 
