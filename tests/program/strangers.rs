@@ -773,6 +773,42 @@ fn plans_and_archives_of_strangers_are_bounded() {
 }
 
 #[test]
+fn what_a_bundle_lists_is_bounded_before_it_is_used() {
+    let folder = room();
+    folder.run(&["--engines", OWN]).exits(0);
+    folder.luxproof(&["bundle", "out", "--out", "theirs"]).exits(0);
+    let reproduce = |complaint: &str| {
+        seal(&folder.path("theirs"));
+        says(&folder.luxproof(&["reproduce", "theirs", "--out", "again"]).exits(2), complaint);
+    };
+    let lock = folder.read("theirs/lock.json");
+    let change = |key: &str, value: Value| {
+        folder.write("theirs/lock.json", &lock);
+        change_json(&folder.path("theirs/lock.json"), |lock| lock[key] = value);
+    };
+    // The same spec again and again: each would be read.
+    change("specs", json!(vec!["inputs/spec.yaml"; 101]));
+    reproduce("names 101 specs");
+    let engine = folder.json("theirs/lock.json")["engines"][0].clone();
+    change("engines", json!(vec![engine; 101]));
+    reproduce("names 101 engines");
+    change("command", "x".repeat(1 << 20).into());
+    reproduce("more than 1 MB");
+    folder.write("theirs/lock.json", &lock);
+    // It takes no room here.
+    let report = folder.read("theirs/run/report.json");
+    fs::File::create(folder.path("theirs/run/report.json")).unwrap().set_len((32 << 20) + 1).unwrap();
+    reproduce("more than 32 MB");
+    // More engines than any request may name.
+    folder.write("theirs/run/report.json", &report);
+    let path = folder.path("theirs/run/report.json");
+    let mut report = luxproof_report_file::read(&path).unwrap();
+    report.engines = vec![report.engines[0].clone(); 101];
+    luxproof_report_file::keep(&mut report, &path).unwrap();
+    reproduce("101 engines");
+}
+
+#[test]
 fn recorded_readings_that_look_like_an_engine_of_ours_are_refused() {
     let folder = room();
     folder.write("a.csv", "procedure,meter,value\ndirect_illuminance,plane[0],6.32\n");
@@ -879,7 +915,7 @@ fn strangers(args: &[&str]) -> Answer {
 /// By night `ci/nightly` looks at the limits themselves, with the program that ships.
 #[test]
 fn twice_as_much_costs_every_reader_twice_as_much() {
-    let quick = "sets|mtllib|GLDF|spheres|library|rows|deviations|keywords|boxes|cards|submission|pack";
+    let quick = "sets|mtllib|GLDF|spheres|library|rows|deviations|keywords|boxes|cards|submission|bundle|pack";
     strangers(&["--doublings", "--only", quick, "--size", "0.25", "--cpu", "20", "--mib", "300"])
         .exits(0)
         .prints("sets to 2500");

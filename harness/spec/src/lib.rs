@@ -352,8 +352,12 @@ fn similar_file(path: &Path) -> Option<String> {
     nearest(name, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
+/// The longest names that are compared letter by letter, which takes the product of their lengths.
+const MAX_LIKENED_BYTES: usize = 200;
+
 /// The candidate that `word` misspells: a letter or two are wrong, missing, doubled or swapped.
 pub fn misspelt<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let candidates = candidates.filter(|c| word.len() <= MAX_LIKENED_BYTES && c.len() <= MAX_LIKENED_BYTES);
     let near = candidates.map(|c| (strsim::damerau_levenshtein(word, c), c)).filter(|(far, _)| (1..=2).contains(far));
     near.filter(|(_, c)| c.len() > 4).min().map(|(_, c)| c)
 }
@@ -361,6 +365,7 @@ pub fn misspelt<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Op
 /// The candidate most like `word`, if any is like it at all.
 pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     candidates
+        .filter(|c| word.len() <= MAX_LIKENED_BYTES && c.len() <= MAX_LIKENED_BYTES)
         .map(|c| (strsim::jaro_winkler(word, c), c))
         .filter(|(likeness, _)| *likeness > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0))

@@ -24,7 +24,7 @@ use luxproof_report_file::ReadError;
 use luxproof_spec::Faults;
 
 pub use make::{BundleSummary, make, spec_places};
-pub use open::{Opened, is_bundle};
+pub use open::{MAX_FOREIGN_REPORT_BYTES, Opened, is_bundle};
 pub use rerun::{Difference, EngineThen, Outcome, Reproduction, Row};
 
 /// The file that lists the others with their hashes.
@@ -102,6 +102,16 @@ pub fn excess(request: &Request) -> Option<String> {
     ];
     let (what, count) = lists.into_iter().find(|(_, count)| *count > MAX_FOREIGN_NAMES)?;
     Some(format!("names {count} {what}, and no request that is not trusted more than {MAX_FOREIGN_NAMES}"))
+}
+
+/// What the lock of a stranger's bundle has too much of, in words: each spec is read, and each engine looked for.
+fn excess_of_lock(lock: &Lock) -> Option<String> {
+    let lists = [("specs", lock.specs.len()), ("engines", lock.engines.len())];
+    let found = lists.into_iter().find(|(_, count)| *count > MAX_FOREIGN_NAMES);
+    let in_words = found.map(|(what, count)| {
+        format!("names {count} {what}, and no bundle that is not trusted more than {MAX_FOREIGN_NAMES}")
+    });
+    in_words.or_else(|| excess(&lock.request))
 }
 
 /// Why a report of a stranger is not used: each engine has files and pages.

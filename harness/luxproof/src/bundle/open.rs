@@ -27,25 +27,33 @@ use luxproof_process::foreign_json;
 use luxproof_process::printable;
 use luxproof_spec::{BUNDLE_FILE, Trust};
 
-/// How many files and bytes a bundle may have.
+/// How many files and bytes a bundle may have, and how many bytes the files that are parsed.
 #[derive(Clone, Copy)]
 struct BundleLimits {
     files: usize,
     bytes: u64,
+    lock_bytes: u64,
+    report_bytes: u64,
 }
 
 impl BundleLimits {
     /// Of what a stranger gives, a copy is made and hashed before anything is believed: that takes about a second.
     const fn of(trust: Trust) -> Self {
         match trust {
-            Trust::Own => Self { files: 100_000, bytes: 2 * MAX_KEPT_BYTES },
-            Trust::Stranger | Trust::Bundled => Self { files: 10_000, bytes: 256 << 20 },
+            Trust::Own => {
+                Self { files: 100_000, bytes: 2 * MAX_KEPT_BYTES, lock_bytes: MAX_TEXT, report_bytes: MAX_KEPT_BYTES }
+            }
+            Trust::Stranger | Trust::Bundled => {
+                Self { files: 10_000, bytes: 256 << 20, lock_bytes: 1 << 20, report_bytes: MAX_FOREIGN_REPORT_BYTES }
+            }
         }
     }
 }
 
 /// The most bytes of an archive's files, as a multiple of the archive's size.
 const MAX_EXPANSION: u64 = 10;
+/// The most bytes of a stranger's report: it is parsed in about a second.
+pub const MAX_FOREIGN_REPORT_BYTES: u64 = 32 << 20;
 /// The most bytes of the list of hashes, the lock and the description.
 const MAX_TEXT: u64 = 16 << 20;
 
@@ -106,7 +114,8 @@ impl Opened {
         if !faults.is_empty() {
             return Err(broken(faults));
         }
-        let lock = read_bounded(&stage.path().join(LOCK), MAX_TEXT).map_err(|e| FileError::of(&path.join(LOCK), e))?;
+        let lock = read_bounded(&stage.path().join(LOCK), limits.lock_bytes)
+            .map_err(|e| FileError::of(&path.join(LOCK), e))?;
         let lock: Lock = foreign_json::from_slice(&lock).map_err(|source| BundleError::Json {
             bundle: shown.clone(),
             file: LOCK.to_owned(),
@@ -120,14 +129,20 @@ impl Opened {
         // `luxproof bundle` names none: a bundle's policy is found among its inputs.
         let policy = lock.request.policy.as_ref().map(ForeignPath::shown);
         let outside = policy.map(|file| format!("{LOCK} names a policy, and no bundle does: {file}"));
-        let excess = super::excess(&lock.request).filter(|_| trust != Trust::Own);
+        let excess = super::excess_of_lock(&lock).filter(|_| trust != Trust::Own);
         let excess = excess.map(|message| format!("{LOCK} {message}"));
         let faults: Vec<String> =
             strange.chain(outside).chain(excess).map(|fault| printable::line(&fault, 300)).collect();
         if !faults.is_empty() {
             return Err(broken(faults));
         }
-        let report = luxproof_report_file::read(&stage.path().join(RUN).join(REPORT_FILE))?;
+        let report_file = stage.path().join(RUN).join(REPORT_FILE);
+        let report_bytes = fs::metadata(&report_file).map_err(|e| FileError::of(path, e))?.len();
+        if report_bytes > limits.report_bytes {
+            let most = limits.report_bytes >> 20;
+            return Err(broken(vec![format!("{RUN}/{REPORT_FILE} has more than {most} MB, and is not trusted")]));
+        }
+        let report = luxproof_report_file::read(&report_file)?;
         if let Some(excess) = super::excess_of_report(&report).filter(|_| trust != Trust::Own) {
             return Err(broken(vec![format!("{RUN}/{REPORT_FILE} {excess}")]));
         }

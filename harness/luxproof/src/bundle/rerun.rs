@@ -1,6 +1,6 @@
 //! Making a bundle's run again, and what of it comes out the same: reading by reading and verdict by verdict.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
@@ -104,11 +104,13 @@ impl Opened {
         let [before, after] = [&self.report, now].map(|report| Baseline::whole(report).entries);
         let changes = compare(&before, &after, &References::of_report(now)).entries;
         let comparisons = Paired::of(&self.report, now);
-        let read: Vec<&Entry> = before.iter().filter(|entry| !entry.readings.is_empty()).collect();
-        let rows = read.iter().map(|then| {
-            let change = changes.iter().find(|change| change.key == then.key);
-            let failure = now.recordings.iter().find(|r| r.key == then.key).and_then(|r| r.failure.clone());
-            row(then, after.iter().find(|entry| entry.key == then.key), change, failure, &comparisons)
+        let changes: HashMap<&ReadingKey, &EntryChange> = changes.iter().map(|change| (&change.key, change)).collect();
+        let after: HashMap<&ReadingKey, &Entry> = after.iter().map(|entry| (&entry.key, entry)).collect();
+        let failures: HashMap<&ReadingKey, &String> =
+            now.recordings.iter().filter_map(|r| Some((&r.key, r.failure.as_ref()?))).collect();
+        let rows = before.iter().filter(|entry| !entry.readings.is_empty()).map(|then| {
+            let (now, change) = (after.get(&then.key).copied(), changes.get(&then.key).copied());
+            row(then, now, change, failures.get(&then.key).copied().cloned(), &comparisons)
         });
         Reproduction {
             title: self.report.spec.title.clone(),
@@ -178,7 +180,11 @@ fn row(
     let (Some(now), Some(change)) = (now.filter(|entry| !entry.readings.is_empty()), change) else {
         return Row { notes: failure.into_iter().collect(), ..row };
     };
-    let differing = pairs.iter().filter(|(then, now)| has_moved(change, then) || !has_same_verdict(then, *now));
+    let moved: HashSet<(&MeterId, Quantity)> =
+        change.meters.iter().filter(|m| m.significant).map(|m| (&m.meter, m.quantity)).collect();
+    let differing = pairs
+        .iter()
+        .filter(|(then, now)| moved.contains(&(&then.meter, then.quantity)) || !has_same_verdict(then, *now));
     let differences: Vec<Difference> = differing.map(|(then, now)| Difference::of(then, *now)).collect();
     let is_same =
         then.readings == now.readings && pairs.iter().all(|(c, now)| now.is_some_and(|now| now.verdict == c.verdict));
@@ -190,11 +196,6 @@ fn row(
     };
     let mean = change.mean.filter(|_| change.state == State::Shifted).map(|mean| format!("mean {mean}"));
     Row { outcome, differences, notes: mean.into_iter().chain(change.notes.iter().cloned()).collect(), ..row }
-}
-
-/// Whether a comparison's meter moved by more than its uncertainty.
-fn has_moved(change: &EntryChange, c: &Comparison) -> bool {
-    change.meters.iter().any(|m| m.significant && m.meter == c.meter && m.quantity == c.quantity)
 }
 
 /// Whether two comparisons have one verdict; an undecided one fits every other.

@@ -147,6 +147,15 @@ fn source(path: &Path, no_bundle: bool, trust: Trust) -> Result<Source, Diagnost
         let bundle = if no_bundle { BundleSource::None } else { BundleSource::Opened(Box::new(opened)) };
         return Ok(Source { run, report, file, bundle });
     }
+    let bytes = fs::metadata(report_file(path)).map_or(0, |metadata| metadata.len());
+    if trust != Trust::Own && bytes > bundle::MAX_FOREIGN_REPORT_BYTES {
+        let most = bundle::MAX_FOREIGN_REPORT_BYTES >> 20;
+        return Err(miette!(
+            help = "use it without --untrusted if it is yours",
+            "{} has more than {most} MB, and is not trusted",
+            path.display()
+        ));
+    }
     let report = read_report(path)?;
     if let Some(excess) = bundle::excess_of_report(&report).filter(|_| trust != Trust::Own) {
         return Err(miette!(help = "use it without --untrusted if it is yours", "{} {excess}", path.display()));

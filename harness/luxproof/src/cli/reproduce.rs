@@ -235,8 +235,12 @@ fn reproduction_text(reproduction: &Reproduction) -> String {
         text += &format!("  luxproof {} then, {now} now\n", Quoted(&then.to_string()));
     }
     reproduction.engines.iter().filter(|engine| !engine.is_the_same).for_each(|engine| text += &engine_text(engine));
-    for row in reproduction.rows.iter().filter(|row| row.outcome != Outcome::SameBytes) {
+    let other: Vec<&Row> = reproduction.rows.iter().filter(|row| row.outcome != Outcome::SameBytes).collect();
+    for row in other.iter().take(MAX_ROWS) {
         text += &row_text(row);
+    }
+    if other.len() > MAX_ROWS {
+        text += &format!("  and {} more: --format json\n", other.len() - MAX_ROWS);
     }
     text
 }
@@ -254,6 +258,9 @@ fn engine_text(engine: &EngineThen) -> String {
         }
     }
 }
+
+/// The most rows that are printed; the rest are counted.
+const MAX_ROWS: usize = 100;
 
 /// The most differences of a row that are printed; the rest are counted.
 const MAX_DIFFERENCES: usize = 5;

@@ -9,7 +9,7 @@
 //! those of all its meters together. Its variance is larger because its weights are uncertain (Meier, Variance of a weighted mean,
 //! Biometrics 9 (1953) 59).
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -150,13 +150,16 @@ impl Changes {
 /// Other versions and settings are compared and noted; another task is refused.
 pub fn compare(old: &[Entry], new: &[Entry], references: &References<'_>) -> Changes {
     let mut entries = vec![];
+    let known: HashSet<&ReadingKey> = old.iter().map(|before| &before.key).collect();
+    // Of several of one key the first counts.
+    let found: HashMap<&ReadingKey, &Entry> = new.iter().rev().map(|now| (&now.key, now)).collect();
     for before in old {
-        entries.push(match new.iter().find(|now| now.key == before.key) {
+        entries.push(match found.get(&before.key) {
             Some(now) => compare_entry(before, now),
             None => EntryChange::without_meters(before, State::Vanished, vec!["this run no longer exists".to_owned()]),
         });
     }
-    for now in new.iter().filter(|now| !old.iter().any(|before| before.key == now.key)) {
+    for now in new.iter().filter(|now| !known.contains(&now.key)) {
         let note = "no baseline yet: review the run with `luxproof accept`".to_owned();
         entries.push(EntryChange::without_meters(now, State::New, vec![note]));
     }

@@ -7,7 +7,7 @@
 mod changes;
 mod review;
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use itertools::Itertools;
@@ -68,10 +68,8 @@ pub enum BaselineError {
 const REMEDY: &str = "restore it, or review a run anew with `luxproof accept`, which replaces it";
 
 impl Entry {
-    /// The entry of a recording that nothing has accepted yet.
-    fn candidate(report: &Report, recording: &Recording) -> Self {
-        // The remaining readings of an engine that failed are no expectation.
-        let readings = report.readings.iter().filter(|r| r.key == recording.key && recording.failure.is_none());
+    /// The entry of a recording with its readings, which nothing has accepted yet.
+    fn candidate(recording: &Recording, readings: Vec<Reading>) -> Self {
         Self {
             key: recording.key.clone(),
             version: recording.version.clone(),
@@ -81,7 +79,7 @@ impl Entry {
             method: recording.method.clone(),
             accepted: String::new(),
             reason: String::new(),
-            readings: readings.map(|r| r.reading.clone()).collect(),
+            readings,
         }
     }
 
@@ -108,7 +106,15 @@ impl Baseline {
     pub fn whole(report: &Report) -> Self {
         // Recorded readings change with their file alone.
         let taken = report.recordings.iter().filter(|r| r.role != Role::Recorded);
-        let all = taken.map(|r| Entry::candidate(report, r));
+        let mut readings: HashMap<&ReadingKey, Vec<Reading>> = HashMap::new();
+        for record in &report.readings {
+            readings.entry(&record.key).or_default().push(record.reading.clone());
+        }
+        let all = taken.map(|recording| {
+            // The remaining readings of an engine that failed are no expectation.
+            let of_recording = readings.remove(&recording.key).filter(|_| recording.failure.is_none());
+            Entry::candidate(recording, of_recording.unwrap_or_default())
+        });
         Self { entries: all.sorted_by(|a, b| a.key.cmp(&b.key)).collect() }
     }
 
