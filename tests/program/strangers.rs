@@ -757,6 +757,9 @@ fn plans_and_archives_of_strangers_are_bounded() {
         plan["asked"][key] = json!(vec!["simulator"; 101]);
         folder.write("plan.json", &plan.to_string());
         read("names 101");
+        plan["asked"][key] = json!(["*a".repeat(1000)]);
+        folder.write("plan.json", &plan.to_string());
+        read("has a name of 2000 bytes");
     }
     folder.write("plan.json", &(whole.to_string() + &" ".repeat(16 << 20)));
     read("more than 16 MB");
@@ -915,7 +918,8 @@ fn strangers(args: &[&str]) -> Answer {
 /// By night `ci/nightly` looks at the limits themselves, with the program that ships.
 #[test]
 fn twice_as_much_costs_every_reader_twice_as_much() {
-    let quick = "sets|mtllib|GLDF|spheres|library|rows|deviations|keywords|boxes|cards|submission|bundle|pack";
+    let quick =
+        "axes|overrides|sets|mtllib|GLDF|spheres|library|rows|deviations|keywords|boxes|cards|submission|bundle|pack";
     strangers(&["--doublings", "--only", quick, "--size", "0.25", "--cpu", "20", "--mib", "300"])
         .exits(0)
         .prints("sets to 2500");

@@ -3,7 +3,7 @@
 //! A mapping overrides a mapping key by key, and a list of items with an `id` item by item.
 //! Every other value replaces the value that was there.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use serde_yaml::{Mapping, Value};
 
@@ -139,9 +139,14 @@ fn parse_list(source: &Source, list: Vec<Value>, faults: &mut Vec<SpecError>) ->
     overrides
 }
 
+/// The most axes of a matrix: each combination has an override of each.
+const MAX_AXES: usize = 20;
+
 /// Every combination of one override an axis, the last axis fastest.
 fn matrix(source: &Source, axes: Mapping) -> Result<Vec<Vec<Override>>, SpecError> {
     let mut combinations: Vec<Vec<Override>> = vec![vec![]];
+    let message = format!("{} axes", axes.len());
+    source.require(axes.len() <= MAX_AXES, "cases", message, format!("a matrix has at most {MAX_AXES} axes"))?;
     for (axis, choices) in axes {
         let axis = axis.as_str().unwrap_or_default().to_owned();
         let Value::Mapping(choices) = choices else {
@@ -242,8 +247,13 @@ fn lay(base: &mut Value, over: &Value) -> Result<(), String> {
             }
         }
         (Value::Sequence(items), Value::Mapping(over)) if items.iter().all(|i| i.get("id").is_some()) => {
+            let mut places: HashMap<Value, usize> = HashMap::new();
+            for (place, id) in items.iter().enumerate().filter_map(|(place, item)| Some((place, item.get("id")?))) {
+                // Of several items with one id the first is meant.
+                places.entry(id.clone()).or_insert(place);
+            }
             for (id, value) in over {
-                let item = items.iter_mut().find(|i| i.get("id") == Some(id));
+                let item = places.get(id).and_then(|place| items.get_mut(*place));
                 lay(item.ok_or_else(|| id.as_str().unwrap_or("?").to_owned())?, value)?;
             }
         }

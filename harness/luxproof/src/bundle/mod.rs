@@ -93,6 +93,9 @@ pub enum BundleError {
 /// The most engines, patterns and procedures that a request of a stranger names: each is looked for among all.
 const MAX_FOREIGN_NAMES: usize = 100;
 
+/// The longest engine or pattern: patterns are compiled, which takes forty times as much memory.
+const MAX_FOREIGN_NAME_BYTES: usize = 1000;
+
 /// What a request of a stranger has too much of, in words.
 pub fn excess(request: &Request) -> Option<String> {
     let lists = [
@@ -100,8 +103,14 @@ pub fn excess(request: &Request) -> Option<String> {
         ("filters", request.filter.len()),
         ("procedures", request.procedures.len()),
     ];
-    let (what, count) = lists.into_iter().find(|(_, count)| *count > MAX_FOREIGN_NAMES)?;
-    Some(format!("names {count} {what}, and no request that is not trusted more than {MAX_FOREIGN_NAMES}"))
+    if let Some((what, count)) = lists.into_iter().find(|(_, count)| *count > MAX_FOREIGN_NAMES) {
+        return Some(format!("names {count} {what}, and no request that is not trusted more than {MAX_FOREIGN_NAMES}"));
+    }
+    let longest = request.engines.iter().chain(&request.filter).map(String::len).max()?;
+    let message = format!(
+        "has a name of {longest} bytes, and no request that is not trusted one of more than {MAX_FOREIGN_NAME_BYTES}"
+    );
+    (longest > MAX_FOREIGN_NAME_BYTES).then_some(message)
 }
 
 /// What the lock of a stranger's bundle has too much of, in words: each spec is read, and each engine looked for.
