@@ -24,8 +24,7 @@ pub(super) enum Cannot {
     /// Look a table up as the release that our bound of its look-up was made for (`engines/cycles/ies.rs`): from 5.0 on a neighbour that is
     /// missing has the value of the one beside it, where it was dark.
     LookUpAsBefore,
-    /// Load several scenes in one process: lights of an earlier one stay in the registry of Dr.Jit 0.4, and values are then 100 % too small
-    /// up to nine times too large, another time they are right.
+    /// Load several scenes in one process: values are then 100 % too small to nine times too large in some runs. The cause is not known.
     LoadSeveralScenes,
 }
 
