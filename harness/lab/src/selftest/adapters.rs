@@ -11,7 +11,7 @@ use luxproof_scene::{Bounces, Luminaire, Meter, Scene, Transport};
 use luxproof_verdict::diagnosis::{Model, truth};
 
 /// Steps of the grids on which a wrong look-up is sampled for reflected light, in degrees.
-const FINE_STEP_DEG: f64 = 5.0;
+const FINE_STEP_DEG: f64 = 1.0;
 
 /// The readings of an adapter with a fault.
 pub(super) type AdapterReader = Box<dyn Fn(&Model) -> Vec<f64>>;

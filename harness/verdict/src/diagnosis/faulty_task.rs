@@ -18,6 +18,8 @@ use luxproof_spec::procedures::{Target, Task};
 
 /// Relative error that the simulator is asked for; what it reaches is a hundred times better.
 const ACCURACY: f64 = 1e-2;
+/// How far a corner reaches, as a part of the room's smallest side.
+const CORNER_SHARE: f64 = 0.02;
 /// Largest relative correction of a fine prediction: the reference knows the unchanged scene better.
 const MAX_CORRECTION: f64 = 0.25;
 /// Cost of a luminaire seen from a meter where a box may hide it. The unit of work is one that nothing hides.
@@ -337,16 +339,33 @@ impl Model {
         reads_other_tables && self.is_cheap() && is_bare(&faulty.task.scene) && faulty.readouts.is_empty()
     }
 
-    /// Predicts the readings by target, and leaves those at the edges of a wrong look-up blank: they are NaN.
+    /// Predicts the readings by target, and leaves those blank that it does not know: they are NaN.
+    ///
+    /// These are readings at the edges of a wrong look-up and, for a rough prediction, those in corners of the room.
     pub fn predict_with_blanks(&self, faulty: &FaultyTask, fidelity: Fidelity) -> Option<Vec<f64>> {
         let mut readings = self.predict(faulty, fidelity)?;
-        if self.may_have_edges(faulty) {
-            let at_edges = edges::are_at_edges(&faulty.task, faulty.law);
-            for (reading, _) in readings.iter_mut().zip(at_edges).filter(|(_, is_at_edge)| *is_at_edge) {
-                *reading = f64::NAN;
-            }
+        let unknown = if self.may_have_edges(faulty) {
+            edges::are_at_edges(&faulty.task, faulty.law)
+        } else if fidelity == Fidelity::Rough && !self.is_cheap() {
+            self.task.targets.iter().map(|t| self.is_in_a_corner(t)).collect()
+        } else {
+            return Some(readings);
+        };
+        for (reading, _) in readings.iter_mut().zip(unknown).filter(|(_, is_unknown)| *is_unknown) {
+            *reading = f64::NAN;
         }
         Some(readings)
+    }
+
+    /// Whether a target is so close to two surfaces of the room that patches do not resolve their light.
+    fn is_in_a_corner(&self, target: &Target) -> bool {
+        let Some(room) = self.task.scene.room else { return false };
+        let near_m = CORNER_SHARE * room.size_m.min_element();
+        target.aspects.iter().any(|aspect| {
+            let low_m = aspect.meter.position_m;
+            let distances_m = [low_m, room.size_m - low_m].map(|distances_m| distances_m.to_array());
+            distances_m.as_flattened().iter().filter(|distance_m| **distance_m < near_m).count() > 1
+        })
     }
 
     /// Predicts the readings by target; `None` where they cannot be predicted.

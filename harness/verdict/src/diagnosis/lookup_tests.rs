@@ -124,6 +124,30 @@ fn the_reader_of_these_tests_is_right() {
 }
 
 #[test]
+fn a_thinned_table_keeps_its_ends_and_its_bends() {
+    // Straight from 0 to 45 and 90 degrees, then dark at once, in steps of a degree and in planes of ten degrees.
+    let gamma_deg: Vec<f64> = (0..=180).map(f64::from).collect();
+    let c_deg: Vec<f64> = (0..=36).map(|k| 10.0 * f64::from(k)).collect();
+    let row = gamma_deg.iter().map(|g| {
+        if *g <= 45.0 {
+            300.0 - 4.0 * g
+        } else if *g <= 90.0 {
+            165.0 - g
+        } else {
+            0.0
+        }
+    });
+    let row: Vec<f64> = row.collect();
+    let table = Table::new(c_deg.clone(), gamma_deg, c_deg.iter().flat_map(|_| row.clone()).collect()).unwrap();
+    let mut luminaire = fixtures::luminaire("long", DVec3::ZERO, table.clone());
+    assert!(super::tables::thin(&mut luminaire));
+    let thinned = &luminaire.photometry.distribution;
+    assert_eq!(thinned.gamma_deg(), [0.0, 45.0, 90.0, 91.0, 180.0]);
+    let [before, after] = [&table, thinned].map(|table| table.flux().value());
+    assert!((after / before - 1.0).abs() < 1e-9, "{after} for {before}");
+}
+
+#[test]
 fn tables_without_interpolation_are_named_whichever_way_they_round() {
     let (nearest, lower) = ("in C and gamma: the nearest angle counts", "in C and gamma: the next lower angle counts");
     assert_named(|t, c, g| weighted(t, c, g, |part| if part <= 0.5 { 0.0 } else { 1.0 }), one, nearest);
