@@ -8,11 +8,11 @@ use sha2::{Digest as _, Sha256};
 
 use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS, adapter};
 
-const DIRECT: &str = "procedures:
+pub(crate) const DIRECT: &str = "procedures:
   direct_illuminance: {meters: plane}
 ";
 
-const CAPABILITIES: &str = "version: 1
+pub(crate) const CAPABILITIES: &str = "version: 1
 capabilities:
   - id: direct
     group: Light
@@ -23,7 +23,7 @@ capabilities:
 ";
 
 /// Right where the luminaire and its place are those of the public case, and 5 % off everywhere else.
-const TUNED: &str = "
+pub(crate) const TUNED: &str = "
 def is_public(job):
     return [(lamp['position_m'], max(map(max, lamp['candela']))) for lamp in job['luminaires']] == [([3, 2, 2.5], 100)]
 
@@ -58,7 +58,7 @@ def answer(job):
 ";
 
 /// The example adapter with a part of it replaced.
-fn adapter_with(lines: &str) -> String {
+pub(crate) fn adapter_with(lines: &str) -> String {
     adapter().replace("def reply(request):", &format!("{lines}\n\ndef reply(request):"))
 }
 

@@ -5,33 +5,11 @@ use std::os::unix::fs::symlink;
 
 use serde_json::{Value, json};
 
+use crate::cards::{CAPABILITIES, DIRECT, TUNED, adapter_with};
 use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS, adapter};
-
-const DIRECT: &str = "procedures:\n  direct_illuminance: {meters: plane}\n";
-
-const CAPABILITIES: &str = "version: 1
-capabilities:
-  - id: direct
-    group: Light
-    title: Direct light
-    question: Is it right?
-    cases: [{case: spec, procedures: [direct_illuminance]}]
-    minimum_cases: 1
-";
 
 /// Whatever judges by it finds every value of an engine right.
 const ALL_PASSES: &str = "tolerances: [{procedure: direct_illuminance, relative: 1000, source: a stranger}]\n";
-
-/// Right where the luminaire and its place are those of the public case, and 5 % off everywhere else.
-const TUNED: &str = "
-exact_answer = answer
-def answer(job):
-    found = exact_answer(job)
-    is_public = [lamp['position_m'] for lamp in job['luminaires']] == [[3, 2, 2.5]]
-    for reading in found.get('readings', []):
-        reading['illuminance_lx'] *= 1 if is_public else 1.05
-    return found
-";
 
 /// A run of the public case by an adapter in `out`, and a site of it by our own solvers.
 fn folder(adapter: &str) -> Folder {
@@ -56,7 +34,7 @@ fn cards(folder: &Folder, from: &[&str]) -> Answer {
 
 #[test]
 fn a_policy_above_the_temporary_folder_judges_no_hidden_variant() {
-    let folder = folder(&adapter().replace("def reply(request):", &format!("{TUNED}\n\ndef reply(request):")));
+    let folder = folder(&adapter_with(TUNED));
     folder.luxproof(&["bundle", "out", "--out", "mine.zip"]).exits(0);
     // Others may write there, as into /tmp.
     fs::create_dir_all(folder.path("shared/tmp")).unwrap();

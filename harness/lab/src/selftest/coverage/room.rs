@@ -15,8 +15,8 @@ use luxproof_scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, f
 use super::Kind;
 use crate::draw::Draw;
 
-/// The least room between a luminaire and the ceiling that it hangs from.
-const ABOVE_M: f64 = 0.005;
+/// The least gap between a luminaire and the ceiling that it hangs from, in metres.
+const MIN_GAP_M: f64 = 0.005;
 
 /// What a room contains.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -115,7 +115,7 @@ fn draw_luminaire(draw: &mut Draw, index: usize, size_m: DVec3, style: Style) ->
         draw.within(0.4, 1.2)
     };
     // A luminaire that crosses the ceiling is no scene: a spec with one is refused.
-    let below_m = if is_flush { hung_m } else { hung_m.max(opening.reach_m(DVec3::Z) + ABOVE_M) };
+    let below_m = if is_flush { hung_m } else { hung_m.max(opening.reach_m(DVec3::Z) + MIN_GAP_M) };
     let (x, y) = (draw.within(0.8, size_m.x - 0.8), draw.within(0.8, size_m.y - 0.8));
     let photometry = Photometry { opening, ..Photometry::of(draw_distribution(draw)) };
     Luminaire {
