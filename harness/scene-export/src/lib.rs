@@ -3,6 +3,7 @@
 //! Pure: a scene to files and a list of what the format cannot say. Coordinates stay in metres with z up; glTF gets a root
 //! node that turns them to y up.
 
+mod flat;
 mod gltf;
 mod soup;
 #[cfg(test)]
@@ -56,14 +57,27 @@ pub struct ExportedScene {
 pub fn export_scene(scene: &Scene, title: &str, format: SceneFormat) -> ExportedScene {
     let mut losses = vec!["points and procedures are no part of the scene".to_owned()];
     let mut files = vec![];
+    let mut lights = vec![];
     for (k, luminaire) in scene.luminaires.iter().enumerate() {
-        let (bytes, remarks) = photometric_file(luminaire);
-        losses.extend(remarks.into_iter().map(|remark| format!("`{}`: {remark}", luminaire.id)));
-        files.push(ExportedFile { name: profile_name(k), bytes });
-        losses.extend(shape_loss(luminaire, format).map(|what| format!("`{}`: {what}", luminaire.id)));
+        let lost = match format {
+            SceneFormat::Usd => {
+                let (of_luminaire, lost) = usd::lights(luminaire, k);
+                files.extend(of_luminaire.iter().map(|light| light.profile.clone()));
+                lights.extend(of_luminaire);
+                lost
+            }
+            SceneFormat::Gltf => {
+                let (bytes, mut lost) = photometric_file(luminaire);
+                files.push(ExportedFile { name: profile_name(k), bytes });
+                let has_extent = luminaire.model != LuminaireModel::Point;
+                lost.extend(has_extent.then(|| "EXT_lights_ies has points alone: its luminous opening is lost".into()));
+                lost
+            }
+        };
+        losses.extend(lost.into_iter().map(|what| format!("`{}`: {what}", luminaire.id)));
     }
     let (name, text) = match format {
-        SceneFormat::Usd => ("scene.usda", usd::text(scene, title)),
+        SceneFormat::Usd => ("scene.usda", usd::text(scene, title, &lights)),
         SceneFormat::Gltf => ("scene.gltf", gltf::text(scene, title)),
     };
     files.push(ExportedFile { name: name.into(), bytes: text.into_bytes() });
@@ -83,17 +97,4 @@ fn photometric_file(luminaire: &Luminaire) -> (Vec<u8>, Vec<String>) {
     }
     let written = lm63::write_2002(photometry);
     (written.text.into_bytes(), written.losses)
-}
-
-/// What is lost of a luminaire that is more than a point.
-fn shape_loss(luminaire: &Luminaire, format: SceneFormat) -> Option<String> {
-    if luminaire.model == LuminaireModel::Point {
-        return None;
-    }
-    Some(match format {
-        SceneFormat::Gltf => "EXT_lights_ies has points alone: its luminous opening is lost".into(),
-        SceneFormat::Usd => {
-            "UsdLux has no shape for the candela of an opening: a flat light multiplies them by its cosine".into()
-        }
-    })
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DMat4, DQuat, DVec3};
-use luxproof_photometry::{LuminousIntensityDistribution, Photometry};
+use luxproof_photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry};
 use luxproof_scene::geometry::{Reflectances, Room};
 use luxproof_scene::{Obstacle, Shape, orientation};
 use serde_json::Value;
@@ -122,4 +122,45 @@ fn a_usd_light_takes_no_name_of_another_prim() {
     assert_eq!(names.len(), 1 + 7 + 2);
     let distinct: std::collections::BTreeSet<&str> = names.iter().copied().collect();
     assert_eq!(distinct.len(), names.len(), "{names:?}");
+}
+
+/// What `UsdLux` makes of a flat light: luminance, which is `intensity` divided by the area, times area, cosine and profile.
+#[test]
+fn a_flat_usd_light_has_the_candela_of_its_luminaire() {
+    let mut scene = scene();
+    let table = LuminousIntensityDistribution::new(
+        vec![0.0, 45.0, 90.0],
+        vec![0.0, 40.0, 90.0, 130.0, 180.0],
+        vec![300.0, 250.0, 0.0, 80.0, 50.0, 300.0, 100.0, 0.0, 20.0, 50.0, 300.0, 200.0, 0.0, 90.0, 50.0],
+    );
+    let opening = LuminousOpening::Box { x_m: 1.2, y_m: 0.3, height_m: 0.0 };
+    scene.luminaires[0].photometry = Arc::new(Photometry { opening, ..Photometry::of(table.unwrap()) });
+    scene.luminaires[0].model = LuminaireModel::Area;
+    let exported = export_scene(&scene, "a room", SceneFormat::Usd);
+    let text = file(&exported, "scene.usda");
+    for part in ["def RectLight \"desk__left_\"", "def RectLight \"desk__left__up\"", "float inputs:width = 1.2\n"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert_eq!(text.matches("float inputs:intensity = 0.8\n").count(), 2);
+    assert_eq!(exported.losses.len(), 1, "{:?}", exported.losses);
+    // The matrix of the light that shines up has the luminaire's x as it is, and its y and z turned over.
+    let own = scene.luminaires[0].orientation;
+    let matrix = text.split("matrix4d xformOp:transform = ").nth(2).unwrap().lines().next().unwrap();
+    let numbers: Vec<f64> =
+        matrix.split(['(', ')', ',', ' ']).filter(|word| !word.is_empty()).map(|word| word.parse().unwrap()).collect();
+    let rows: Vec<DVec3> = numbers.chunks(4).map(DVec3::from_slice).collect();
+    for (row, axis) in rows.iter().zip([own.x_axis, -own.y_axis, -own.z_axis]) {
+        assert!(row.distance(axis) < 1e-12, "{rows:?}");
+    }
+    let distribution = &scene.luminaires[0].photometry.distribution;
+    for (name, is_up) in [("luminaire-0.ies", false), ("luminaire-0-up.ies", true)] {
+        let profile = lm63::parse(file(&exported, name).as_bytes()).unwrap();
+        for k in 0..900 {
+            let (c, gamma) = (f64::from(37 * k % 360), 0.0999 * f64::from(k));
+            let found = profile.distribution.intensity(c, gamma).value() * gamma.to_radians().cos();
+            let (own_c, own_gamma) = if is_up { (-c, 180.0 - gamma) } else { (c, gamma) };
+            let expected = distribution.intensity(own_c, own_gamma).value();
+            assert!((found - expected).abs() <= 3e-4 * expected + 1e-9, "{name} {c} {gamma}: {found} {expected}");
+        }
+    }
 }

@@ -11,8 +11,9 @@ use itertools::Itertools as _;
 use luxproof_photometry::LuminousOpening;
 use luxproof_scene::{Luminaire, LuminaireModel, Scene};
 
-use crate::profile_name;
+use crate::flat::{FlatLights, FlatShape, Side, flat_lights};
 use crate::soup::{Mesh, meshes};
+use crate::{ExportedFile, photometric_file, profile_name};
 
 /// `intensity` of a sphere per candela of its profile.
 const SPHERE_INTENSITY: f64 = 4.0;
@@ -23,7 +24,7 @@ const POINT_RADIUS_M: f64 = 1e-3;
 const MATERIALS: &str = "Materials";
 
 /// The layer.
-pub(crate) fn text(scene: &Scene, title: &str) -> String {
+pub(crate) fn text(scene: &Scene, title: &str, lights: &[Light]) -> String {
     let meshes = meshes(scene);
     let mut names = PrimNames([MATERIALS.to_owned()].into());
     let mut text = format!(
@@ -41,8 +42,8 @@ pub(crate) fn text(scene: &Scene, title: &str) -> String {
         let material = reflectances.iter().position(|rho| *rho == mesh.reflectance).unwrap_or_default();
         text += &mesh_prim(mesh, &names.unique(&mesh.name), material);
     }
-    for (k, luminaire) in scene.luminaires.iter().enumerate() {
-        text += &light(luminaire, &names.unique(&luminaire.id), &profile_name(k));
+    for light in lights {
+        text += &light_prim(light, &names.unique(&light.id));
     }
     text + "}\n"
 }
@@ -113,18 +114,93 @@ fn mesh_prim(mesh: &Mesh, name: &str, material: usize) -> String {
     )
 }
 
-/// The light of a luminaire.
-fn light(luminaire: &Luminaire, name: &str, profile: &str) -> String {
-    let (kind, shape, factor) = match (luminaire.model, luminaire.photometry.opening) {
-        (LuminaireModel::Point, _) | (_, LuminousOpening::Point) => sphere(),
-        (_, LuminousOpening::Box { x_m, y_m, height_m: 0.0 }) if x_m > 0.0 && y_m > 0.0 => {
-            ("RectLight", format!("float inputs:width = {x_m}\n        float inputs:height = {y_m}"), 1.0)
+/// A light with its profile.
+pub(crate) struct Light {
+    id: String,
+    shape: LightShape,
+    intensity: f64,
+    orientation: DMat3,
+    position_m: DVec3,
+    /// Its photometric file.
+    pub(crate) profile: ExportedFile,
+}
+
+/// What a light is in `UsdLux`.
+#[derive(Clone, Copy)]
+enum LightShape {
+    /// A sphere that is treated as a point.
+    Point,
+    Flat(FlatShape),
+}
+
+impl LightShape {
+    /// The kind of prim, and the attributes of its extent.
+    fn prim(self) -> (&'static str, String) {
+        match self {
+            Self::Point => {
+                let size = format!("float inputs:radius = {POINT_RADIUS_M}\n        bool treatAsPoint = 1");
+                ("SphereLight", size)
+            }
+            Self::Flat(FlatShape::Rectangle { x_m, y_m }) => {
+                ("RectLight", format!("float inputs:width = {x_m}\n        float inputs:height = {y_m}"))
+            }
+            Self::Flat(FlatShape::Disk { radius_m }) => ("DiskLight", format!("float inputs:radius = {radius_m}")),
         }
-        (_, LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 }) if x_m == y_m && x_m > 0.0 => {
-            ("DiskLight", format!("float inputs:radius = {}", 0.5 * x_m), 1.0)
-        }
-        _ => sphere(),
+    }
+}
+
+/// The lights of luminaire `k`, and what they lose, one sentence each.
+pub(crate) fn lights(luminaire: &Luminaire, k: usize) -> (Vec<Light>, Vec<String>) {
+    let Luminaire { position_m, orientation, .. } = *luminaire;
+    let Some(shape) = FlatShape::of(luminaire) else {
+        let (bytes, mut losses) = photometric_file(luminaire);
+        losses.extend(lost_extent(luminaire));
+        let light = Light {
+            id: luminaire.id.clone(),
+            shape: LightShape::Point,
+            intensity: SPHERE_INTENSITY * luminaire.flux_scale,
+            orientation,
+            position_m,
+            profile: ExportedFile { name: profile_name(k), bytes },
+        };
+        return (vec![light], losses);
     };
+    let FlatLights { profiles, mut losses } = flat_lights(&luminaire.photometry);
+    if luminaire.model == LuminaireModel::Impostor {
+        losses.push("UsdLux has no impostor: it becomes an area".into());
+    }
+    let lights = profiles.into_iter().map(|(side, bytes)| {
+        let (id, name) = match side {
+            Side::Down => (luminaire.id.clone(), profile_name(k)),
+            Side::Up => (format!("{}_up", luminaire.id), format!("luminaire-{k}-up.ies")),
+        };
+        Light {
+            id,
+            shape: LightShape::Flat(shape),
+            intensity: luminaire.flux_scale,
+            orientation: orientation * side.turn(),
+            position_m,
+            profile: ExportedFile { name, bytes },
+        }
+    });
+    (lights.collect(), losses)
+}
+
+/// What is lost of an opening that is not flat.
+fn lost_extent(luminaire: &Luminaire) -> Option<String> {
+    if luminaire.model == LuminaireModel::Point || luminaire.photometry.opening == LuminousOpening::Point {
+        return None;
+    }
+    let [y_m, x_m, z_m] = luminaire.photometry.opening.bounding_box_m();
+    Some(format!(
+        "UsdLux has no light for its opening of {x_m} x {y_m} x {z_m} m: all of its light comes from one point"
+    ))
+}
+
+/// The prim of a light.
+fn light_prim(light: &Light, name: &str) -> String {
+    let Light { shape, intensity, orientation, position_m, profile, .. } = light;
+    let (kind, size) = shape.prim();
     format!(
         r#"
     def {kind} "{name}" (
@@ -133,7 +209,7 @@ fn light(luminaire: &Luminaire, name: &str, profile: &str) -> String {
     {{
         float inputs:intensity = {intensity}
         bool inputs:normalize = 1
-        {shape}
+        {size}
         float inputs:shaping:cone:angle = 180
         float inputs:shaping:ies:angleScale = 0
         asset inputs:shaping:ies:file = @{profile}@
@@ -142,15 +218,9 @@ fn light(luminaire: &Luminaire, name: &str, profile: &str) -> String {
         uniform token[] xformOpOrder = ["xformOp:transform"]
     }}
 "#,
-        intensity = factor * luminaire.flux_scale,
-        matrix = matrix(luminaire.orientation, luminaire.position_m),
+        profile = profile.name,
+        matrix = matrix(*orientation, *position_m),
     )
-}
-
-/// A sphere that is treated as a point.
-fn sphere() -> (&'static str, String, f64) {
-    let shape = format!("float inputs:radius = {POINT_RADIUS_M}\n        bool treatAsPoint = 1");
-    ("SphereLight", shape, SPHERE_INTENSITY)
 }
 
 /// A rotation and a translation; USD multiplies rows from the left.
