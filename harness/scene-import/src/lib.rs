@@ -31,7 +31,7 @@ pub use summaries::{GroupSummary, ImportSummary, LeftOut, MeshSummary, RoomKind,
 
 use luxproof_process::printable::Quoted;
 use luxproof_spec::{Faults, SpecError, Trust, suggestion};
-use raw::{Kind, Raw, Scene, luminous};
+use raw::{Kind, Raw, Scene};
 use room_detection::{Around, around};
 use triangle_soup::{Corners, Soup};
 
@@ -158,6 +158,7 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
         room: around.summary,
         meshes: around.meshes.iter().map(Part::summarize).collect(),
         luminaires: luminaires.iter().map(ImportedLuminaire::summarize).collect(),
+        lights_left_out: raw.lights_left_out + shining(&raw),
         left_out: left_out(&raw, &chosen),
         notes: raw.notes,
     };
@@ -187,7 +188,7 @@ fn reflectance(raw: &Raw<'_>, material: &raw::Material, options: &Options) -> Re
     let given = options.reflectances.get(&material.name).copied();
     let (what, help) = match (&material.kind, given) {
         (_, Some(rho)) => return Ok(Some(rho)),
-        (Kind::Diffuse { rgb }, None) => return Ok(Some(luminous(*rgb))),
+        (Kind::Diffuse { rgb }, None) => return Ok(Some(raw.primaries.luminous(*rgb))),
         (Kind::Light(_), None) => return Ok(None),
         (Kind::Other(_) | Kind::Unknown, None) if options.leaves_out => return Ok(None),
         (Kind::Other(what), None) => {
@@ -268,6 +269,11 @@ fn taken(raw: &Raw<'_>, chosen: &[Option<f64>], soup: &Soup, options: &Options) 
     rows.collect()
 }
 
+/// How many materials shine.
+fn shining(raw: &Raw<'_>) -> usize {
+    raw.materials.iter().filter(|m| m.surfaces > 0 && matches!(m.kind, Kind::Light(_))).count()
+}
+
 fn left_out(raw: &Raw<'_>, chosen: &[Option<f64>]) -> Vec<LeftOut> {
     let materials = raw.materials.iter().zip(chosen).filter(|(m, rho)| rho.is_none() && m.surfaces > 0);
     let of_material = materials.map(|(m, _)| {
@@ -294,6 +300,8 @@ fn left_out(raw: &Raw<'_>, chosen: &[Option<f64>]) -> Vec<LeftOut> {
 
 #[cfg(test)]
 mod closed_tests;
+#[cfg(test)]
+mod round_trip_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

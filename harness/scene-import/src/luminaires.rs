@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use glam::{DMat3, DMat4, DVec3};
 use luxproof_photometry::{LuminousIntensityDistribution, Photometry, lm63};
 use luxproof_process::printable;
+use luxproof_scene::LuminaireModel;
 use serde::Serialize;
 
 use crate::Up;
@@ -18,8 +19,8 @@ pub(super) struct RawLight {
     pub(super) axes: DMat3,
     pub(super) profile: Profile,
     pub(super) flux_scale: f64,
-    /// Whether its light comes from one point, whatever opening its file states.
-    pub(super) is_point: bool,
+    /// How its light leaves it, where the scene says so, whatever opening its file states.
+    pub(super) model: Option<LuminaireModel>,
 }
 
 /// Where the light of a scene goes.
@@ -56,8 +57,8 @@ pub struct ImportedLuminaire {
     pub rotate_deg: [f64; 3],
     /// Factor on every intensity.
     pub flux_scale: f64,
-    /// Whether its light comes from one point, whatever opening its file states.
-    pub is_point: bool,
+    /// How its light leaves it, where the scene says so, whatever opening its file states.
+    pub model: Option<LuminaireModel>,
 }
 
 /// A luminaire in the summary of an import.
@@ -99,7 +100,7 @@ pub(super) fn luminaires(lights: Vec<RawLight>, up: Up, unit_m: f64, origin_m: D
             at_m: unit_m * upright(light.position) + origin_m,
             rotate_deg: rotation_deg(orientation),
             flux_scale: light.flux_scale,
-            is_point: light.is_point,
+            model: light.model,
         }
     };
     lights.into_iter().enumerate().map(convert).collect()

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use luxproof_scene::geometry::obj::Obj;
 
-use super::raw::{Kind, NO_MATERIAL, Raw, Scene};
+use super::raw::{Kind, NO_MATERIAL, Primaries, Raw, Scene};
 use luxproof_process::printable::{Quoted, quoted_path};
 use luxproof_spec::SpecError;
 
@@ -35,7 +35,7 @@ pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
     let bytes = scene.bytes()?;
     let help = "repair the file, or export it again as Wavefront OBJ";
     let obj = Obj::read(&mut bytes.as_slice()).map_err(|f| scene.fault(Some(f.line), f.message, help))?;
-    let mut raw = Raw::new(scene, PRECISION);
+    let mut raw = Raw::new(scene, PRECISION, Primaries::Rec709);
     for (what, (count, line)) in &obj.others {
         raw.leave_out(what, *count, Some(*line));
     }

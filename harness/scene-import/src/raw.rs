@@ -20,8 +20,34 @@ const MAX_NOTES: usize = 200;
 /// The name of what has no material.
 pub(super) const NO_MATERIAL: &str = "default";
 
-/// Weights by which red, green and blue make a luminous reflectance (Radiance's, of its own primaries).
-const LUMINOUS: [f64; 3] = [0.265, 0.670, 0.065];
+/// The primaries of a format's colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Primaries {
+    /// Radiance's own, with white of equal energy.
+    Radiance,
+    /// ITU-R BT.709 with D65: glTF 2.0 (3.9.2), `OpenUSD` (`UsdLux`, its blackbody colours), and programs that write OBJ.
+    Rec709,
+}
+
+impl Primaries {
+    /// Weights by which linear red, green and blue make a luminous value.
+    const fn weights(self) -> [f64; 3] {
+        match self {
+            Self::Radiance => [0.265, 0.670, 0.065],
+            Self::Rec709 => [0.2126, 0.7152, 0.0722],
+        }
+    }
+
+    /// The share of white light that a colour reflects or emits, to six decimals.
+    pub(super) fn luminous(self, rgb: [f64; 3]) -> f64 {
+        let sum: f64 = if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
+            rgb[0]
+        } else {
+            rgb.iter().zip(self.weights()).map(|(part, weight)| part * weight).sum()
+        };
+        (sum * 1e6).round() / 1e6
+    }
+}
 
 /// What a surface is made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,16 +70,6 @@ impl Kind {
             None => Ok(Self::Diffuse { rgb }),
         }
     }
-}
-
-/// The share of daylight that a colour reflects, to six decimals.
-pub(super) fn luminous(rgb: [f64; 3]) -> f64 {
-    let sum: f64 = if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
-        rgb[0]
-    } else {
-        rgb.iter().zip(LUMINOUS).map(|(part, weight)| part * weight).sum()
-    };
-    (sum * 1e6).round() / 1e6
 }
 
 /// A material of the scene.
@@ -87,6 +103,8 @@ pub(super) struct Raw<'a> {
     pub(super) materials: Vec<Material>,
     pub(super) triangles: Vec<Triangle>,
     pub(super) lights: Vec<RawLight>,
+    /// Lights that no luminaire can be.
+    pub(super) lights_left_out: usize,
     /// Bytes of the profiles of all lights.
     pub(super) profile_bytes: usize,
     pub(super) others: Others,
@@ -97,6 +115,7 @@ pub(super) struct Raw<'a> {
     pub(super) up: Option<Up>,
     /// What its coordinates are known to, relative to its extent.
     pub(super) precision: f64,
+    pub(super) primaries: Primaries,
     triangulator: Triangulator,
 }
 
@@ -133,18 +152,20 @@ impl Scene<'_> {
 }
 
 impl<'a> Raw<'a> {
-    pub(super) fn new(scene: &'a Scene<'a>, precision: f64) -> Self {
+    pub(super) fn new(scene: &'a Scene<'a>, precision: f64, primaries: Primaries) -> Self {
         Self {
             scene,
             materials: vec![],
             triangles: vec![],
             lights: vec![],
+            lights_left_out: 0,
             profile_bytes: 0,
             others: Others::new(),
             notes: vec![],
             unit_m: None,
             up: None,
             precision,
+            primaries,
             triangulator: Triangulator::default(),
         }
     }
@@ -165,6 +186,12 @@ impl<'a> Raw<'a> {
 
     pub(super) fn leave_out(&mut self, what: &'static str, count: usize, line: Option<usize>) {
         self.others.entry(what).or_insert((0, line)).0 += count;
+    }
+
+    /// Leaves out a light.
+    pub(super) fn leave_out_light(&mut self, what: &'static str, line: Option<usize>) {
+        self.leave_out(what, 1, line);
+        self.lights_left_out += 1;
     }
 
     /// Adds a light. Each becomes a luminaire with its own file, however often a scene names one profile.

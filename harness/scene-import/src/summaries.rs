@@ -26,6 +26,8 @@ pub struct ImportSummary {
     pub room: RoomSummary,
     pub meshes: Vec<MeshSummary>,
     pub luminaires: Vec<LuminaireSummary>,
+    /// Lights, and materials that shine, of which no luminaire was made.
+    pub lights_left_out: usize,
     pub left_out: Vec<LeftOut>,
     pub notes: Vec<String>,
 }

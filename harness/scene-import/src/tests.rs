@@ -323,7 +323,8 @@ fn colours_of_points_multiply_the_base_colour_of_gltf() {
         assert_eq!((summary.materials[0].reflectance, summary.triangles), (0.1, 1), "{summary:?}");
     }
     let green = read(painted(&[[0.2, 0.4, 0.6, 1.0]; 3], 3, ""));
-    let luminous = 0.5 * (0.265 * 0.2 + 0.670 * 0.4 + 0.065 * 0.6);
+    // Linear colours of glTF have the primaries of ITU-R BT.709.
+    let luminous = 0.5 * (0.2126 * 0.2 + 0.7152 * 0.4 + 0.0722 * 0.6);
     assert!((green.materials[0].reflectance - luminous).abs() < 1e-6, "{green:?}");
     let white = read(painted(&[[1.0; 4]; 3], 3, ""));
     assert_eq!((white.materials[0].name.as_str(), white.materials[0].reflectance), ("grey", 0.5));

@@ -133,6 +133,52 @@ fn profiles_multiply_and_flat_lights_add_their_cosine() {
     assert_eq!(candela(&flat, 0.0, 120.0), 0.0);
 }
 
+/// `OpenUSD`'s colours have the primaries of ITU-R BT.709, its blackbody colours a luminance of 1 by these weights.
+#[test]
+fn colours_of_lights_count_by_their_luminance_and_odd_inputs_are_noted() {
+    let red = only(
+        r#"def SphereLight "P" { float inputs:intensity = 4000
+        bool inputs:normalize = 1
+        bool treatAsPoint = 1
+        color3f inputs:color = (1, 0, 0) }"#,
+    );
+    assert_near(candela(&red, 0.0, 30.0), 212.6, 1e-6);
+    let (luminaires, said) = lights(
+        r#"def RectLight "dim" { float inputs:diffuse = 0.25
+        float inputs:intensity = 4 }"#,
+    );
+    let photometry = lm63::parse(&luminaires[0].bytes).unwrap();
+    assert_near(candela(&(luminaires[0].clone(), photometry), 0.0, 0.0), 1.0, 1e-6);
+    assert!(said.contains("`dim`: its intensities are multiplied by its `diffuse` 0.25"), "{said}");
+    let centimetres = layer(
+        r#"def SphereLight "P" { float inputs:intensity = 4
+        bool inputs:normalize = 1
+        bool treatAsPoint = 1 }"#,
+    )
+    .replace("metersPerUnit = 1", "metersPerUnit = 0.01");
+    let imported = read(&[("a.usda", centimetres.as_bytes())]).unwrap();
+    assert!(notes(&imported).contains("has 1e-4 times the light"), "{}", notes(&imported));
+    let photometry = lm63::parse(&imported.luminaires[0].bytes).unwrap();
+    assert_near(candela(&(imported.luminaires[0].clone(), photometry), 0.0, 0.0), 1.0, 1e-6);
+}
+
+/// Planes of 90 to 270 degrees, and a table that is dark at once beyond its end.
+#[test]
+fn profiles_of_flat_lights_keep_their_planes_and_ends() {
+    let table = b"IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 2 1 2 0 0 0\n1 1 0\n0 60\n90 270\n200 200\n200 100\n";
+    let text = layer(
+        r#"def DiskLight "D" { float inputs:intensity = 1
+        bool inputs:normalize = 1
+        asset inputs:shaping:ies:file = @b.ies@ }"#,
+    );
+    let imported = read(&[("a.usda", text.as_bytes()), ("b.ies", table)]).unwrap();
+    let photometry = lm63::parse(&imported.luminaires[0].bytes).unwrap();
+    let disk = (imported.luminaires[0].clone(), photometry);
+    assert_near(candela(&disk, 90.0, 60.0), 100.0, 1e-9);
+    assert_near(candela(&disk, 270.0, 60.0), 50.0, 1e-9);
+    assert_eq!(candela(&disk, 90.0, 60.01), 0.0);
+}
+
 #[test]
 fn what_no_photometric_file_says_is_left_out_and_named() {
     let (luminaires, left_out) = lights(

@@ -119,6 +119,12 @@ pub(super) fn run(args: &ImportArgs, trust: Trust) -> Result<Exit, Diagnostic> {
     }
     let cases: Vec<Case> = suite(std::slice::from_ref(&spec), trust).map_err(diagnose)?;
     warn(&find_lints(&cases));
+    if imported.luminaires.is_empty() && imported.summary.lights_left_out > 0 {
+        complain(&format!(
+            "warning: no light of the scene became a luminaire (`left out` says why); the one in {} is a placeholder",
+            spec.display()
+        ));
+    }
     let what = if imported.luminaires.is_empty() { "luminaires and meters" } else { "meters" };
     complain(&format!("next: put {what} into {}, then luxproof check it", spec.display()));
     Ok(Exit::Passed)
@@ -160,10 +166,9 @@ fn with_luminaires(text: String, luminaires: &[ImportedLuminaire]) -> String {
     };
     let Some((_, tail)) = rest.split_once("\nmeters:\n") else { return text };
     let mut lines = String::new();
-    for ImportedLuminaire { id, file, at_m, rotate_deg: [azimuth, tilt, roll], flux_scale, is_point, .. } in luminaires
-    {
+    for ImportedLuminaire { id, file, at_m, rotate_deg: [azimuth, tilt, roll], flux_scale, model, .. } in luminaires {
         let [x, y, z] = at_m.to_array();
-        let model = if *is_point { "    model: point\n" } else { "" };
+        let model = model.map(|model| format!("    model: {}\n", model.name())).unwrap_or_default();
         lines += &format!(
             "  - id: {id}\n    photometry: {file}\n    at_m: [{x}, {y}, {z}]\n    \
              rotate_deg: {{azimuth: {azimuth}, tilt: {tilt}, roll: {roll}}}\n    flux_scale: {flux_scale}\n{model}",

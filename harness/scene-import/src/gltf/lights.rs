@@ -4,12 +4,12 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use glam::{DMat4, DVec3};
 use luxproof_photometry::{LuminousIntensityDistribution, Photometry, lm63};
+use luxproof_scene::LuminaireModel;
 
 use super::Reader;
 use super::buffers::uri_bytes;
 use super::document::{LightOf, Node, Spot};
 use crate::luminaires::{Profile, RawLight, axes};
-use crate::raw::luminous;
 use luxproof_spec::SpecError;
 
 /// Between the cosines of a spot's cones, at least.
@@ -25,12 +25,19 @@ impl Reader<'_, '_> {
         let punctual = extensions.light.as_ref().map(|of| self.punctual(k, of)).transpose()?.flatten();
         for (profile, flux_scale) in found.into_iter().chain(punctual) {
             let Some(axes) = axes(transform) else {
-                self.raw.leave_out("lights that are mirrored or sheared", 1, None);
+                self.raw.leave_out_light("lights that are mirrored or sheared", None);
                 continue;
             };
             let position = transform.transform_point3(DVec3::ZERO);
             self.raw.light(
-                RawLight { name: node.name.clone(), position, axes, profile, flux_scale, is_point: true },
+                RawLight {
+                    name: node.name.clone(),
+                    position,
+                    axes,
+                    profile,
+                    flux_scale,
+                    model: Some(LuminaireModel::Point),
+                },
                 None,
             )?;
         }
@@ -43,14 +50,14 @@ impl Reader<'_, '_> {
         let light = lights.and_then(|lights| lights.lights.0.get(of.light));
         let light = light.ok_or_else(|| self.fault(&format!("nodes[{k}]: there is no light profile {}", of.light)))?;
         let Some(uri) = &light.uri else {
-            self.raw.leave_out("light profiles in a buffer view (EXT_lights_ies)", 1, None);
+            self.raw.leave_out_light("light profiles in a buffer view (EXT_lights_ies)", None);
             return Ok(None);
         };
         let bytes = uri_bytes(self.raw.scene, uri)
             .map_err(|(why, help)| self.raw.scene.fault(None, format!("nodes[{k}]: its light profile: {why}"), help))?;
-        let factor = of.multiplier.unwrap_or(1.0) * luminous(of.color.unwrap_or([1.0; 3]));
+        let factor = of.multiplier.unwrap_or(1.0) * self.raw.primaries.luminous(of.color.unwrap_or([1.0; 3]));
         if !(factor.is_finite() && factor > 0.0) {
-            self.raw.leave_out("lights without light", 1, None);
+            self.raw.leave_out_light("lights without light", None);
             return Ok(None);
         }
         Ok(Some((Profile::File(bytes), factor)))
@@ -61,10 +68,10 @@ impl Reader<'_, '_> {
         let lights = self.document.extensions.as_ref().and_then(|all| all.punctual.as_ref());
         let light = lights.and_then(|lights| lights.lights.0.get(of.light));
         let light = light.ok_or_else(|| self.fault(&format!("nodes[{k}]: there is no light {}", of.light)))?;
-        let candela = light.intensity.unwrap_or(1.0) * luminous(light.color.unwrap_or([1.0; 3]));
+        let candela = light.intensity.unwrap_or(1.0) * self.raw.primaries.luminous(light.color.unwrap_or([1.0; 3]));
         let is_local = matches!(light.kind.as_str(), "point" | "spot");
         if is_local && !(candela.is_finite() && candela > 0.0) {
-            self.raw.leave_out("lights without light", 1, None);
+            self.raw.leave_out_light("lights without light", None);
             return Ok(None);
         }
         match light.kind.as_str() {
@@ -72,16 +79,16 @@ impl Reader<'_, '_> {
             "spot" => {
                 let file = spot_file(candela, light.spot);
                 if file.is_none() {
-                    self.raw.leave_out("spots without a cone of at most 90 degrees (KHR_lights_punctual)", 1, None);
+                    self.raw.leave_out_light("spots without a cone of at most 90 degrees (KHR_lights_punctual)", None);
                 }
                 Ok(file.map(|bytes| (Profile::File(bytes), 1.0)))
             }
             "directional" => {
-                self.raw.leave_out("directional lights, which are at no place (KHR_lights_punctual)", 1, None);
+                self.raw.leave_out_light("directional lights, which are at no place (KHR_lights_punctual)", None);
                 Ok(None)
             }
             _ => {
-                self.raw.leave_out("lights of an unknown type (KHR_lights_punctual)", 1, None);
+                self.raw.leave_out_light("lights of an unknown type (KHR_lights_punctual)", None);
                 Ok(None)
             }
         }

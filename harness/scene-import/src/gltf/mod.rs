@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 use glam::{DMat4, DQuat, DVec3};
 
-use super::raw::{Kind, NO_MATERIAL, Raw, Scene};
+use super::raw::{Kind, NO_MATERIAL, Primaries, Raw, Scene};
 use luxproof_process::foreign_json;
 use luxproof_process::printable::{Quoted, quoted};
 use luxproof_spec::SpecError;
@@ -49,7 +49,7 @@ pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
         let message = format!("asset.version is `{}`", Quoted(&document.asset.version));
         return Err(scene.fault(None, message, "export it as glTF 2.0"));
     }
-    let mut raw = Raw::new(scene, PRECISION);
+    let mut raw = Raw::new(scene, PRECISION, Primaries::Rec709);
     extensions(&mut raw, &document)?;
     let materials: Vec<u32> =
         document.materials.0.iter().enumerate().map(|(k, of)| material(&mut raw, k, of)).collect::<Result<_, _>>()?;

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::raw::{Kind, Raw, Scene};
+use super::raw::{Kind, Primaries, Raw, Scene};
 use luxproof_process::printable::Quoted;
 use luxproof_spec::{SpecError, suggestion};
 
@@ -78,7 +78,8 @@ const PATTERNS: [&str; 11] = [
 pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
     let bytes = scene.bytes()?;
     let text = String::from_utf8_lossy(&bytes);
-    let mut reader = Reader { raw: Raw::new(scene, PRECISION), named: HashMap::new(), has_curves: false };
+    let mut reader =
+        Reader { raw: Raw::new(scene, PRECISION, Primaries::Radiance), named: HashMap::new(), has_curves: false };
     let mut words = Words::new(scene, &text);
     while let Some(next) = words.next()? {
         match next {

@@ -12,8 +12,9 @@ use luxproof_photometry::{HorizontalAxis, LuminousIntensityDistribution, Luminou
 use super::Reader;
 use super::layer::Prim;
 use crate::luminaires::{Profile, RawLight, axes};
-use crate::raw::luminous;
-use luxproof_process::printable::quoted_path;
+use crate::raw::Primaries;
+use luxproof_process::printable::{Quoted, quoted_path};
+use luxproof_scene::LuminaireModel;
 use luxproof_spec::SpecError;
 
 /// Steps of a table in gamma and C, in degrees: a cosine that is straight between them is off by 4e-5 and 2e-4.
@@ -89,6 +90,18 @@ impl Shape {
         }
     }
 
+    /// Those steps with the nodes of a table, between its ends: beyond them it is dark at once.
+    fn nodes_with(self, table: &LuminousIntensityDistribution) -> (Vec<f64>, Vec<f64>) {
+        let (c_deg, gamma_deg) = self.steps_deg();
+        // A shape that looks the same from every plane leaves those of the table as they are.
+        let all_c = if c_deg.len() == 1 { table.c_deg().to_vec() } else { joined(&c_deg, table.full_circle().c_deg()) };
+        let mut all_gamma = joined(&gamma_deg, table.gamma_deg());
+        if let [first, .., last] = *table.gamma_deg() {
+            all_gamma.retain(|gamma| (first..=last).contains(gamma));
+        }
+        (all_c, all_gamma)
+    }
+
     fn opening(self) -> LuminousOpening {
         match self {
             Self::Sphere { radius_m } => {
@@ -115,29 +128,56 @@ impl Reader<'_, '_> {
     /// Takes a light, or says why not; other prims are passed over.
     pub(super) fn light(&mut self, prim: &Prim, to_world: &DMat4) -> Result<(), SpecError> {
         if let Some((_, what)) = OTHER_LIGHTS.iter().find(|(kind, _)| *kind == prim.kind) {
-            self.raw.leave_out(what, 1, Some(prim.line));
+            self.raw.leave_out_light(what, Some(prim.line));
             return Ok(());
         }
         let Some(shape) = self.shape(prim, to_world)? else { return Ok(()) };
         if let Some(what) = untaken(prim, shape) {
-            self.raw.leave_out(what, 1, Some(prim.line));
+            self.raw.leave_out_light(what, Some(prim.line));
             return Ok(());
         }
         let Some(axes) = axes(to_world) else {
-            self.raw.leave_out("lights that are mirrored or sheared", 1, Some(prim.line));
+            self.raw.leave_out_light("lights that are mirrored or sheared", Some(prim.line));
             return Ok(());
         };
-        let candela = candela_per_profile(prim, shape);
+        let candela = candela_per_profile(prim, shape, self.raw.primaries);
         if !(candela.is_finite() && candela > 0.0) {
-            self.raw.leave_out("lights without light", 1, Some(prim.line));
+            self.raw.leave_out_light("lights without light", Some(prim.line));
             return Ok(());
         }
-        let is_point = matches!(shape, Shape::Sphere { .. }) && prim.is_true("treatAsPoint");
+        self.note_controls(prim);
+        let is_sphere = matches!(shape, Shape::Sphere { .. });
+        let is_point = is_sphere && prim.is_true("treatAsPoint");
         let opening = if is_point { LuminousOpening::Point } else { shape.opening() };
         let Some((profile, flux_scale)) = self.profile(prim, shape, candela, opening)? else { return Ok(()) };
+        let model = if is_point {
+            Some(LuminaireModel::Point)
+        } else if is_sphere && profile_name(prim).is_some() {
+            // The opening is the one of the photometric file, if it has one.
+            None
+        } else {
+            Some(LuminaireModel::Area)
+        };
         let position = to_world.transform_point3(DVec3::ZERO);
-        let light = RawLight { name: Some(prim.name.clone()), position, axes, profile, flux_scale, is_point };
+        let light = RawLight { name: Some(prim.name.clone()), position, axes, profile, flux_scale, model };
         self.raw.light(light, Some(prim.line))
+    }
+
+    /// Notes inputs that `UsdLux` leaves open, or that are none of the light itself.
+    fn note_controls(&mut self, prim: &Prim) {
+        if let Some(diffuse) = input(prim, "diffuse").filter(|diffuse| *diffuse != 1.0) {
+            let name = Quoted(&prim.name);
+            self.raw.note(format!(
+                "`{name}`: its intensities are multiplied by its `diffuse` {diffuse}: all surfaces here are diffuse"
+            ));
+        }
+        if is_input(prim, "normalize") && self.unit_m != 1.0 {
+            let factor = self.unit_m * self.unit_m;
+            self.raw.note(format!(
+                "`normalize` divides by an area in square metres. OpenUSD 26.11 does not name the unit (pull request \
+                 3587): a program that takes units of the scene has {factor:e} times the light"
+            ));
+        }
     }
 
     /// The shape of a light; `None` where a prim is none, or one that is not round.
@@ -160,7 +200,7 @@ impl Reader<'_, '_> {
             return Err(self.fault(prim, "it has no size", "give it one"));
         }
         if round.iter().any(|[a, b]| (a - b).abs() > SAME_LENGTH * a.abs()) {
-            self.raw.leave_out("round lights that are scaled to ovals", 1, Some(prim.line));
+            self.raw.leave_out_light("round lights that are scaled to ovals", Some(prim.line));
             return Ok(None);
         }
         Ok(Some(shape))
@@ -174,8 +214,7 @@ impl Reader<'_, '_> {
         candela: f64,
         opening: LuminousOpening,
     ) -> Result<Option<(Profile, f64)>, SpecError> {
-        let name = text_input(prim, "shaping:ies:file").filter(|name| !name.is_empty());
-        let Some(name) = name else {
+        let Some(name) = profile_name(prim) else {
             if opening == LuminousOpening::Point {
                 return Ok(Some((Profile::Isotropic(candela), 1.0)));
             }
@@ -195,14 +234,26 @@ impl Reader<'_, '_> {
             return Ok(Some((Profile::File(bytes), candela)));
         }
         let Ok(photometry) = lm63::parse(&bytes) else {
-            self.raw.leave_out("lights with a profile that is no LM-63 file", 1, Some(prim.line));
+            self.raw.leave_out_light("lights with a profile that is no LM-63 file", Some(prim.line));
             return Ok(None);
         };
-        let table = photometry.distribution;
-        let (c_deg, gamma_deg) = shape.steps_deg();
-        let nodes = (joined(&c_deg, table.c_deg()), joined(&gamma_deg, table.gamma_deg()));
-        let intensity = |c: f64, gamma: f64| candela * shape.seen_share(c, gamma) * table.intensity(c, gamma).value();
-        Ok(self.drawn(prim, intensity, nodes, opening))
+        self.raw.note(
+            "profiles of flat lights and cylinders are multiplied by the area that is seen from each direction (of flat \
+             lights the cosine of gamma), as UsdLux says: the photometric files here have the product",
+        );
+        let in_type_c = photometry.distribution.in_type_c();
+        if in_type_c.largest_error_cd > 0.0 {
+            self.raw.note(format!(
+                "the profile of `{}` becomes a table of type C: it differs by up to {:.3} of {:.3} cd",
+                Quoted(&prim.name),
+                in_type_c.largest_error_cd,
+                photometry.distribution.max_intensity().value(),
+            ));
+        }
+        let table = in_type_c.distribution;
+        let nodes = shape.nodes_with(&table);
+        let intensity = |c: f64, gamma: f64| shape.seen_share(c, gamma) * table.intensity(c, gamma).value();
+        Ok(self.drawn(prim, intensity, nodes, opening).map(|(profile, _)| (profile, candela)))
     }
 
     /// A photometric file of intensities at the nodes of a table.
@@ -215,7 +266,7 @@ impl Reader<'_, '_> {
     ) -> Option<(Profile, f64)> {
         let candela = c_deg.iter().flat_map(|c| gamma_deg.iter().map(|gamma| intensity(*c, *gamma))).collect();
         let Ok(distribution) = LuminousIntensityDistribution::new(c_deg, gamma_deg, candela) else {
-            self.raw.leave_out("lights of intensities that no table has", 1, Some(prim.line));
+            self.raw.leave_out_light("lights of intensities that no table has", Some(prim.line));
             return None;
         };
         let photometry = Photometry { opening, ..Photometry::of(distribution) };
@@ -231,12 +282,17 @@ fn joined(a: &[f64], b: &[f64]) -> Vec<f64> {
     all
 }
 
+/// The name of the photometric file of a light.
+fn profile_name(prim: &Prim) -> Option<&str> {
+    text_input(prim, "shaping:ies:file").filter(|name| !name.is_empty())
+}
+
 /// The luminous intensity per candela of a profile, or in candela without one, where most of the light is seen.
-fn candela_per_profile(prim: &Prim, shape: Shape) -> f64 {
+fn candela_per_profile(prim: &Prim, shape: Shape, primaries: Primaries) -> f64 {
     let colour = inputs(prim, "color").and_then(|rgb| <[f64; 3]>::try_from(rgb).ok()).unwrap_or([1.0; 3]);
     let nits = input(prim, "intensity").unwrap_or(1.0) * input(prim, "exposure").unwrap_or(0.0).exp2();
     let area_m2 = if is_input(prim, "normalize") { 1.0 } else { shape.area_m2() };
-    nits * luminous(colour) * input(prim, "diffuse").unwrap_or(1.0) * shape.projected_share() * area_m2
+    nits * primaries.luminous(colour) * input(prim, "diffuse").unwrap_or(1.0) * shape.projected_share() * area_m2
 }
 
 /// What of a light a photometric file cannot say.

@@ -12,8 +12,7 @@ mod words;
 use glam::{DMat4, DVec3};
 
 use super::Up;
-use super::raw::{NO_MATERIAL, Raw, Scene};
-use crate::raw::Kind;
+use super::raw::{Kind, NO_MATERIAL, Primaries, Raw, Scene};
 use luxproof_process::printable::Quoted;
 use luxproof_spec::SpecError;
 
@@ -48,7 +47,7 @@ const OTHER_SHAPES: [(&str, &str); 11] = [
 pub(super) fn read<'a>(scene: &'a Scene<'a>, given_unit_m: Option<f64>) -> Result<Raw<'a>, SpecError> {
     let bytes = scene.bytes()?;
     let layer = Layer::parse(scene, text_of(scene, &bytes)?)?;
-    let mut raw = Raw::new(scene, PRECISION);
+    let mut raw = Raw::new(scene, PRECISION, Primaries::Rec709);
     let unit_m = given_unit_m.or(layer.meters_per_unit).unwrap_or(DEFAULT_UNIT_M);
     if !(unit_m.is_finite() && unit_m > 0.0) {
         return Err(scene.fault(None, "metersPerUnit is no length", "correct it, such as `metersPerUnit = 1`"));
