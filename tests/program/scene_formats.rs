@@ -43,7 +43,7 @@ fn a_spec_is_written_as_usd_and_as_gltf_with_its_own_photometric_file() {
     assert!(usd.contains("def SphereLight \"lamp\"") && usd.contains("float inputs:intensity = 3.2"), "{usd}");
 }
 
-/// A panel that shines up and down: two lights, whose files give the luminaire's candela after the cosine.
+/// A panel that shines up and down: two lights, and their files give the luminaire's candela after the cosine.
 #[test]
 fn a_panel_goes_to_usd_and_comes_back_with_its_readings() {
     let panel = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 5 1 1 2 .3 1.2 0\n1 1 0\n0 45 90 135 180\n0\n300 200 40 90 50\n";

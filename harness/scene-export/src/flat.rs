@@ -9,7 +9,7 @@ use itertools::Itertools as _;
 use luxproof_photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, lm63};
 use luxproof_scene::{Luminaire, LuminaireModel};
 
-/// The last angle whose intensity is divided by its cosine; at 90 degrees the light has none, whatever its profile says.
+/// The last angle where the intensity is divided by the cosine; at 90 degrees the light has none, whatever its profile says.
 const LAST_GAMMA_DEG: f64 = 89.9;
 /// The widest step in gamma. The importer multiplies a profile by the cosine in the same steps.
 const GAMMA_STEP_DEG: f64 = 1.0;
