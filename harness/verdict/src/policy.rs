@@ -180,6 +180,10 @@ impl PolicyChoice {
         let mut faults = tolerance::faults(&source, &project.tolerances);
         faults.extend(known::faults(&source, &project.known_deviations));
         faults.extend(project.misspelt(&source, declared));
+        if project.required_engines.len() > MAX_REQUIRED_ENGINES {
+            let message = format!("requires more than {MAX_REQUIRED_ENGINES} engines");
+            faults.push(source.error_at("required_engines", message, "name those that every run must have"));
+        }
         for (name, ProfileBudget { relative_error, seconds }) in project.profiles.iter().map(|(n, p)| (n, p.budget)) {
             for (field, value) in [("relative_error", relative_error), ("seconds", seconds)] {
                 let (at, sound) =
@@ -256,6 +260,9 @@ pub fn overruled(cases: &[Case], policies: &[Arc<Policy>], choice: &PolicyChoice
     }
     found
 }
+
+/// The most engines that a policy requires: reports name each one that is missing.
+const MAX_REQUIRED_ENGINES: usize = 100;
 
 const VOUCH: &str = "say what verdicts are held to in a policy of yours, and name it with --policy";
 
