@@ -258,7 +258,7 @@ fn concurrent_cases(options: &Options<'_>) -> usize {
 impl Options<'_> {
     /// Locks the output folder.
     pub fn claim(&self) -> Result<OutputLock, OutputLockError> {
-        let claim = if self.trust == Trust::Own { OutputLock::of } else { OutputLock::without_links };
+        let claim = if self.trust == Trust::Own { OutputLock::of } else { OutputLock::of_plain_folder };
         claim(&self.out)
     }
 }

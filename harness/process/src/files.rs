@@ -54,10 +54,10 @@ pub const MAX_BYTES: u64 = 256 << 20;
 /// The most bytes of a file that reports size 0.
 const MAX_UNSIZED_BYTES: u64 = 1 << 20;
 
-/// Opens a regular file of at most `most` bytes, and limits reading to one byte more.
+/// Opens a regular file for reading.
 ///
 /// Pipes and devices are refused, since a pipe may wait for ever and a device may never end.
-fn open_bounded(path: &Path, most: u64) -> io::Result<(Take<File>, u64)> {
+pub fn open_regular(path: &Path) -> io::Result<(File, Metadata)> {
     // The first check comes before opening: opening some devices has an effect.
     std::fs::metadata(path).and_then(require_regular)?;
     // NONBLOCK: some files of the system claim to be regular, and reading them would wait.
@@ -65,6 +65,12 @@ fn open_bounded(path: &Path, most: u64) -> io::Result<(Take<File>, u64)> {
     let file = File::options().read(true).custom_flags(nonblocking).open(path)?;
     // The second check comes after opening: a pipe may have replaced the file.
     let metadata = file.metadata().and_then(require_regular)?;
+    Ok((file, metadata))
+}
+
+/// Opens a regular file of at most `most` bytes, and limits reading to one byte more.
+fn open_bounded(path: &Path, most: u64) -> io::Result<(Take<File>, u64)> {
+    let (file, metadata) = open_regular(path)?;
     // Files of the system report size 0 and may have no end.
     let most = if metadata.len() == 0 { most.min(MAX_UNSIZED_BYTES) } else { most };
     if metadata.len() > most {
@@ -185,18 +191,33 @@ pub fn link_in(path: &Path) -> Option<PathBuf> {
     parts.into_iter().find(|part| std::fs::symlink_metadata(part).is_ok_and(|metadata| metadata.is_symlink()))
 }
 
-/// The first link on the way to a folder or anywhere below it: what a stranger wrote there may lead elsewhere.
-pub fn link_in_or_below(folder: &Path) -> Option<PathBuf> {
-    link_in(folder).or_else(|| link_below(folder))
+/// An entry of a folder that a writer must not touch: a link leads elsewhere, a pipe may wait for ever.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnsafeEntry {
+    pub path: PathBuf,
+    /// What it is: `a link`, or `no regular file`.
+    pub what: &'static str,
 }
 
-fn link_below(folder: &Path) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.into_iter().find_map(|entry| match entry.file_type() {
-        Ok(kind) if kind.is_symlink() => Some(entry.path()),
-        Ok(kind) if kind.is_dir() => link_below(&entry.path()),
-        _ => None,
-    })
+impl UnsafeEntry {
+    /// The first one on the way to a folder or anywhere below it, where a stranger may have written.
+    pub fn in_or_below(folder: &Path) -> Option<Self> {
+        link_in(folder).map(Self::link).or_else(|| Self::below(folder))
+    }
+
+    fn below(folder: &Path) -> Option<Self> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.into_iter().find_map(|entry| match entry.file_type() {
+            Ok(kind) if kind.is_symlink() => Some(Self::link(entry.path())),
+            Ok(kind) if kind.is_dir() => Self::below(&entry.path()),
+            Ok(kind) if !kind.is_file() => Some(Self { path: entry.path(), what: "no regular file" }),
+            _ => None,
+        })
+    }
+
+    const fn link(path: PathBuf) -> Self {
+        Self { path, what: "a link" }
+    }
 }
 
 /// How the names of files begin that are not finished.
@@ -290,13 +311,18 @@ pub fn ignore_absence(error: io::Error) -> io::Result<()> {
 pub fn sweep(folder: &Path) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED)) {
-        let is_left = File::open(entry.path()).is_ok_and(|file| is_old(&file) && file.try_lock().is_ok());
         match entry.file_type() {
-            Ok(kind) if is_left && kind.is_file() => std::fs::remove_file(entry.path()).ok(),
-            Ok(kind) if is_left && kind.is_dir() => std::fs::remove_dir_all(entry.path()).ok(),
+            Ok(kind) if kind.is_file() && is_left(&entry.path()) => std::fs::remove_file(entry.path()).ok(),
+            Ok(kind) if kind.is_dir() && is_left(&entry.path()) => std::fs::remove_dir_all(entry.path()).ok(),
+            // Pipes and links are not even opened: a pipe may wait for ever.
             _ => None,
         };
     }
+}
+
+/// Whether the writer of an unfinished file or folder has ended.
+fn is_left(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| is_old(&file) && file.try_lock().is_ok())
 }
 
 /// Whether it is there long enough for its writer to have locked it.

@@ -9,7 +9,7 @@ use std::time::SystemTime;
 use rustix::fs::OFlags;
 
 use super::clock::timestamp;
-use super::files::{self, FileError, UNFINISHED};
+use super::files::{self, FileError, UNFINISHED, UnsafeEntry};
 
 /// The file that is locked; it stays, since a process that removes it removes the lock of another.
 const NAME: &str = ".luxproof.lock";
@@ -32,13 +32,15 @@ pub enum OutputLockError {
 }
 
 impl OutputLock {
-    /// The same for a run of a stranger's specs, who may have written the folder: it holds no links, nor do any lead to it.
-    pub fn without_links(folder: &Path) -> Result<Self, OutputLockError> {
-        match files::link_in_or_below(folder) {
+    /// The same for a run of a stranger's specs, who may have written the folder: it holds no links and pipes, and no
+    /// link leads to it.
+    pub fn of_plain_folder(folder: &Path) -> Result<Self, OutputLockError> {
+        match UnsafeEntry::in_or_below(folder) {
             None => Self::of(folder),
-            Some(link) => {
-                let error = io::Error::new(io::ErrorKind::InvalidInput, "it is a link, and the specs are not trusted");
-                Err(OutputLockError::File(FileError::of(&link, error)))
+            Some(UnsafeEntry { path, what }) => {
+                let message = format!("it is {what}, and the specs are not trusted");
+                let error = io::Error::new(io::ErrorKind::InvalidInput, message);
+                Err(OutputLockError::File(FileError::of(&path, error)))
             }
         }
     }

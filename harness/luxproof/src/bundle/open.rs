@@ -3,12 +3,13 @@
 //! Every byte is verified before any of it is used, and files are written below a temporary folder only.
 
 use luxproof_model::ForeignPath;
-use std::cell::LazyCell;
-use std::collections::BTreeSet;
+use std::cell::{Cell, LazyCell};
+use std::collections::{BTreeSet, HashSet};
 use std::fs::{self, File};
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use serde::Deserialize;
 use tempfile::TempDir;
@@ -27,11 +28,14 @@ use luxproof_process::foreign_json;
 use luxproof_process::printable;
 use luxproof_spec::{BUNDLE_FILE, Trust};
 
-/// How many files and bytes a bundle may have, and how many bytes the files that are parsed.
+/// How many files, folders and bytes a bundle may have, and how many bytes the files that are parsed.
 #[derive(Clone, Copy)]
 struct BundleLimits {
+    /// The most files, and the most folders.
     files: usize,
     bytes: u64,
+    /// Of the list of files in an archive.
+    list_bytes: u64,
     lock_bytes: u64,
     report_bytes: u64,
 }
@@ -40,12 +44,20 @@ impl BundleLimits {
     /// Of what a stranger gives, a copy is made and hashed before anything is believed: that takes about a second.
     const fn of(trust: Trust) -> Self {
         match trust {
-            Trust::Own => {
-                Self { files: 100_000, bytes: 2 * MAX_KEPT_BYTES, lock_bytes: MAX_TEXT, report_bytes: MAX_KEPT_BYTES }
-            }
-            Trust::Stranger | Trust::Bundled => {
-                Self { files: 10_000, bytes: 256 << 20, lock_bytes: 1 << 20, report_bytes: MAX_FOREIGN_REPORT_BYTES }
-            }
+            Trust::Own => Self {
+                files: 100_000,
+                bytes: 2 * MAX_KEPT_BYTES,
+                list_bytes: MAX_KEPT_BYTES,
+                lock_bytes: MAX_TEXT,
+                report_bytes: MAX_KEPT_BYTES,
+            },
+            Trust::Stranger | Trust::Bundled => Self {
+                files: 10_000,
+                bytes: 256 << 20,
+                list_bytes: 8 << 20,
+                lock_bytes: 1 << 20,
+                report_bytes: MAX_FOREIGN_REPORT_BYTES,
+            },
         }
     }
 }
@@ -184,8 +196,13 @@ struct Copy<'a> {
 
 impl Copy<'_> {
     fn folder(&mut self, folder: &Path) -> Result<(), BundleError> {
+        let mut folders = 0;
         for entry in WalkDir::new(folder).min_depth(1).sort_by_file_name() {
             let entry = entry.map_err(|e| FileError::of(folder, e))?;
+            folders += usize::from(entry.file_type().is_dir());
+            if folders > self.limits.files {
+                return Err(FileError::of(folder, self.too_many_folders()).into());
+            }
             let below = entry.path().strip_prefix(folder).unwrap_or(entry.path());
             let shown = printable::line(&below.display().to_string(), usize::MAX);
             match name(below) {
@@ -212,9 +229,13 @@ impl Copy<'_> {
 
     fn archive(&mut self, path: &Path) -> Result<(), BundleError> {
         let broken = |e| BundleError::Zip(path.display().to_string(), e);
-        let file = File::open(path).map_err(|e| FileError::of(path, e))?;
-        let whole = file.metadata().map_err(|e| FileError::of(path, e))?.len();
+        let (file, metadata) = files::open_regular(path).map_err(|e| FileError::of(path, e))?;
+        let whole = metadata.len();
+        // The list of an archive's files takes ten times its size in memory.
+        let allowance = Rc::new(Cell::new(self.limits.list_bytes));
+        let file = AllowedReader { from: file, allowance: Rc::clone(&allowance) };
         let mut archive = ZipArchive::new(BufReader::new(file)).map_err(broken)?;
+        allowance.set(u64::MAX);
         // Before any name is read: an entry costs its archive 100 bytes, and a file on the disk much more.
         if archive.len() > self.limits.files {
             return Err(FileError::of(path, self.too_many_files()).into());
@@ -223,6 +244,9 @@ impl Copy<'_> {
         // Of an archive that is not as luxproof packs it nothing is written.
         if !self.faults.is_empty() {
             return Ok(());
+        }
+        if has_more_folders_than(self.limits.files, &entries) {
+            return Err(FileError::of(path, self.too_many_folders()).into());
         }
         for (k, name) in entries.iter().enumerate() {
             // Where its bytes are compressed they are not read.
@@ -236,7 +260,7 @@ impl Copy<'_> {
     /// The places of an archive's files in their order, before any is unpacked; what no bundle holds is a fault.
     fn entries(
         &mut self,
-        archive: &mut ZipArchive<BufReader<File>>,
+        archive: &mut ZipArchive<impl Read + Seek>,
         whole: u64,
     ) -> zip::result::ZipResult<Vec<String>> {
         let (mut places, mut names, mut ranges, mut bytes) = (vec![], BTreeSet::new(), vec![], 0_u64);
@@ -274,6 +298,10 @@ impl Copy<'_> {
         io::Error::new(io::ErrorKind::InvalidInput, format!("it holds more than {} files", self.limits.files))
     }
 
+    fn too_many_folders(&self) -> io::Error {
+        io::Error::new(io::ErrorKind::InvalidInput, format!("it holds more than {} folders", self.limits.files))
+    }
+
     fn too_many_bytes(&self) -> io::Error {
         io::Error::new(io::ErrorKind::InvalidInput, format!("it holds more than {} MB", self.limits.bytes >> 20))
     }
@@ -294,6 +322,35 @@ impl Copy<'_> {
         self.found.insert(name.to_owned(), hash);
         Ok(())
     }
+}
+
+/// A file of which only so many bytes are read.
+struct AllowedReader {
+    from: File,
+    allowance: Rc<Cell<u64>>,
+}
+
+impl Read for AllowedReader {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.from.read(buffer)?;
+        let left = self.allowance.get().checked_sub(count as u64);
+        let left = left.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "its list of files is too long"))?;
+        self.allowance.set(left);
+        Ok(count)
+    }
+}
+
+impl Seek for AllowedReader {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.from.seek(to)
+    }
+}
+
+/// Whether places lie in more than so many folders: each is made where an archive is unpacked.
+fn has_more_folders_than(most: usize, places: &[String]) -> bool {
+    let mut folders = HashSet::new();
+    let all = places.iter().flat_map(|place| place.match_indices('/').map(|(at, _)| &place[..at]));
+    all.into_iter().any(|folder| folders.insert(folder) && folders.len() > most)
 }
 
 /// What is there besides or in place of what is listed, and what is not there.
@@ -350,7 +407,7 @@ fn is_as_packed(archive: &Path, stage: &Path, sums: &Sums) -> Result<bool, Bundl
     let failed = |e: io::Error| FileError::of(archive, e);
     let mut repacked = tempfile::tempfile().map_err(failed)?;
     pack(stage, sums, &mut repacked).map_err(|e| BundleError::Zip(archive.display().to_string(), e))?;
-    io::Seek::rewind(&mut repacked).map_err(failed)?;
+    repacked.rewind().map_err(failed)?;
     let now = hash_rest(&mut File::open(archive).map_err(failed)?).map_err(failed)?;
     Ok(now == hash_rest(&mut repacked).map_err(failed)?)
 }

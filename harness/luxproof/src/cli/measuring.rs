@@ -70,7 +70,7 @@ impl MeasuringArgs {
 
     /// Locks the folder of a measurement. Where the specs are a stranger's, no link leads to it, nor lies in it.
     pub(super) fn claim(folder: &Path, trust: Trust) -> Result<OutputLock, Diagnostic> {
-        let claim = if trust == Trust::Own { OutputLock::of } else { OutputLock::without_links };
+        let claim = if trust == Trust::Own { OutputLock::of } else { OutputLock::of_plain_folder };
         claim(folder).into_diagnostic()
     }
 

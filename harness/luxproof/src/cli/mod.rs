@@ -45,7 +45,8 @@ use luxproof_model::Sampling;
 use luxproof_model::{Exit, Report};
 use luxproof_model::{ProcedureId, ReadingKey};
 use luxproof_photometry_tool::PhotometryArgs;
-use luxproof_process::{files, process};
+use luxproof_process::files::UnsafeEntry;
+use luxproof_process::process;
 use luxproof_spec::{Spec, Trust};
 use luxproof_verdict::{PolicyChoice, ProjectPolicy};
 
@@ -416,11 +417,11 @@ fn schema(of: SchemaOf) -> Result<Exit, Diagnostic> {
 
 /// Refuses to write where links of a stranger may lead elsewhere.
 fn refuse_links(folder: &Path, trust: Trust) -> Result<(), Diagnostic> {
-    match files::link_in_or_below(folder).filter(|_| trust != Trust::Own) {
-        Some(link) => Err(miette::miette!(
+    match UnsafeEntry::in_or_below(folder).filter(|_| trust != Trust::Own) {
+        Some(UnsafeEntry { path, what }) => Err(miette::miette!(
             help = "name another folder with --out",
-            "{} is a link, and what is to be written there is not trusted",
-            link.display()
+            "{} is {what}, and what is to be written there is not trusted",
+            path.display()
         )),
         None => Ok(()),
     }
