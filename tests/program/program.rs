@@ -20,6 +20,7 @@ mod cylindrical;
 mod external_adapter;
 mod faults;
 mod foreign_cards;
+mod foreign_files;
 mod foreign_text;
 mod furnished_office;
 mod glare;

@@ -5,8 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use luxproof_process::files::{MAX_BYTES, read_bounded};
-use luxproof_spec::{Source, SpecError, from_yaml};
+use luxproof_spec::{Source, SpecError, Trust, from_yaml};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -101,17 +100,16 @@ impl Cell {
     }
 }
 
-/// Judges the tables in a file.
+/// Judges the tables in a file. One that is not trusted is no link, and none of its words is shown.
 ///
 /// # Errors
 /// If the file is unreadable, lacks a table, a row or a cell of the template, or has a cell that is no number.
-pub fn judge_copy(path: &Path) -> Result<CopyJudgement, SpecError> {
-    let bytes = read_bounded(path, MAX_BYTES)
-        .map_err(|error| Source::new(path.to_owned(), String::new()).error_at("", error.to_string(), HELP))?;
-    let text = String::from_utf8_lossy(&bytes).into_owned();
-    let source = Source::new(path.to_owned(), text.clone());
-    let file: PrintedFile = from_yaml(&text).map_err(|error| source.error_at("", error, HELP))?;
-    judge(&file, &source)
+pub fn judge_copy(path: &Path, trust: Trust) -> Result<CopyJudgement, SpecError> {
+    let judged = Source::read(path, trust).and_then(|source| {
+        let file: PrintedFile = from_yaml(&source.text).map_err(|error| source.error_at("", error, HELP))?;
+        judge(&file, &source)
+    });
+    judged.map_err(|error| error.withheld(trust))
 }
 
 const HELP: &str = "start from the template: `luxproof reproduce cie171 > my-copy.yaml`";

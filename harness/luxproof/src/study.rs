@@ -5,8 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use luxproof_process::files::{MAX_BYTES, read_bounded};
-use luxproof_spec::{Source, SpecError, from_yaml};
+use luxproof_spec::{Source, SpecError, Trust, from_yaml};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -116,16 +115,16 @@ pub fn study_file(what: &Path) -> Option<PathBuf> {
     is_study.then_some(file)
 }
 
-/// Explains the deviations of a study.
+/// Explains the deviations of a study. One that is not trusted is no link, and none of its words is shown.
 ///
 /// # Errors
 /// If the file is unreadable, or a deviation names an unknown cause or lacks a parameter.
-pub fn explain(path: &Path) -> Result<Explanation, SpecError> {
-    let bytes = read_bounded(path, MAX_BYTES)
-        .map_err(|error| Source::new(path.to_owned(), String::new()).error_at("", error.to_string(), HELP))?;
-    let text = String::from_utf8_lossy(&bytes).into_owned();
-    let source = Source::new(path.to_owned(), text.clone());
-    let file: StudyFile = from_yaml(&text).map_err(|error| source.error_at("", error, HELP))?;
+pub fn explain(path: &Path, trust: Trust) -> Result<Explanation, SpecError> {
+    Source::read(path, trust).and_then(|source| explain_source(&source)).map_err(|error| error.withheld(trust))
+}
+
+fn explain_source(source: &Source) -> Result<Explanation, SpecError> {
+    let file: StudyFile = from_yaml(&source.text).map_err(|error| source.error_at("", error, HELP))?;
     if file.luxproof_study != 1 {
         let message = format!("version {} is not known", file.luxproof_study);
         return Err(source.error_at("luxproof_study", message, "this program reads 1"));
@@ -208,7 +207,7 @@ mod tests {
 
     fn cycles() -> Explanation {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reference/studies/cycles-cie171-2026");
-        explain(&study_file(&folder).unwrap()).unwrap()
+        explain(&study_file(&folder).unwrap(), Trust::Own).unwrap()
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use luxproof_photometry::lm63::Edition;
 use luxproof_photometry::{FileFormat, ForwardPolicy, Lint, Photometry};
+use luxproof_spec::Trust;
 use miette::{Report as Diagnostic, miette};
 
 /// Arguments of the conversion.
@@ -71,13 +72,13 @@ impl ConversionArgs {
     /// Writes the requested file, if any, and prints turns, losses, computed and unknown fields to stderr.
     ///
     /// Returns the lint about turns.
-    pub(super) fn run(&self, photometry: &Photometry) -> Result<Option<Lint>, Diagnostic> {
+    pub(super) fn run(&self, photometry: &Photometry, trust: Trust) -> Result<Option<Lint>, Diagnostic> {
         let Some(out) = &self.convert else { return Ok(None) };
         let format = format_by_extension(out, self.edition.edition())?;
         let (policy, alternative) = self.forward.policy();
         let aimed = photometry.aimed_for(format, policy);
         let written = format.write(&aimed.photometry);
-        super::save(out, &written.text)?;
+        super::save(out, &written.text, trust)?;
         if let Some(lint) = &aimed.lint {
             let message = super::format_lint(&out.display().to_string(), lint);
             luxproof_console::complain(&format!("{message}; {alternative}"));

@@ -81,7 +81,7 @@ pub(super) fn run(args: &DiffArgs, trust: Trust) -> Result<Exit, Diagnostic> {
     let record = DifferenceRecord::new(files, &pair, &difference);
     console::print(&if args.json { console::json(&record)? } else { record.text() })?;
     if let Some(out) = &args.svg {
-        save(out, &draw_map(&pair, &difference))?;
+        save(out, &draw_map(&pair, &difference), trust)?;
     }
     Ok(if difference.likeness == Likeness::Different { Exit::Failed } else { exit })
 }

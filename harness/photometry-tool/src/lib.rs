@@ -154,7 +154,7 @@ pub fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnostic> {
                 let help = "convert it without --untrusted if it is yours";
                 return Err(miette!(help = help, "{values} intensities are more than {MAX_CONVERTED_VALUES}"));
             }
-            turns.extend(write_files(args, &reading.file, photometry)?);
+            turns.extend(write_files(args, &reading.file, photometry, trust)?);
         }
     }
     let has_warnings = readings.iter().any(Reading::has_warnings) || turns.iter().any(is_warning);
@@ -188,7 +188,11 @@ impl Reading {
     /// Reads a file.
     fn load(file: &Path, trust: Trust, tolerance: Tolerance) -> Self {
         let folder = file.parent().unwrap_or(Path::new(""));
-        let result = luxproof_photometry::read_tolerantly_by(file, &|path| trust.read_named(folder, path), tolerance);
+        let result = luxproof_photometry::read_tolerantly_by(
+            file,
+            &|path| trust.check_given(file).and_then(|()| trust.read_named(folder, path)),
+            tolerance,
+        );
         // Here, so that no view of it forgets what may not be shown.
         let result = result.map_err(|error| spec_error(&error).withheld(trust));
         Self { file: file.to_path_buf(), result }
@@ -301,12 +305,17 @@ fn format_utilization(readings: &[Reading]) -> Result<String, Diagnostic> {
 }
 
 /// Writes the diagram and the conversion of a file, and returns the lint of the conversion.
-fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> Result<Option<Lint>, Diagnostic> {
+fn write_files(
+    args: &PhotometryArgs,
+    file: &Path,
+    photometry: &Photometry,
+    trust: Trust,
+) -> Result<Option<Lint>, Diagnostic> {
     if let Some(out) = &args.polar {
         let name = file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        save(out, &polar::diagram(&name, photometry))?;
+        save(out, &polar::diagram(&name, photometry), trust)?;
     }
-    args.conversion.run(photometry)
+    args.conversion.run(photometry, trust)
 }
 
 /// A title and rows of names and values.
@@ -318,8 +327,9 @@ fn format_table(title: &str, rows: &[(&str, String)]) -> String {
     text
 }
 
-/// Writes an output file.
-fn save(path: &Path, text: &str) -> Result<(), Diagnostic> {
+/// Writes an output file. For files of a stranger it goes through no link.
+fn save(path: &Path, text: &str, trust: Trust) -> Result<(), Diagnostic> {
+    trust.check_given(path).map_err(|error| files::FileError::of(path, error)).into_diagnostic()?;
     files::keep_shared(path, text.as_bytes()).into_diagnostic()
 }
 

@@ -133,7 +133,7 @@ pub(super) fn run(args: &OrientArgs, trust: Trust) -> Result<Exit, Diagnostic> {
     let record = OrientationRecord::new(args, &photometry, turn_deg);
     console::print(&if args.json { console::json(&record)? } else { record.text() })?;
     if let Some((out, written, remark)) = written {
-        save(out, &written.text)?;
+        save(out, &written.text, trust)?;
         for loss in remark.iter().chain(&written.losses) {
             console::complain(&format!("{}: {loss}", out.display()));
         }

@@ -133,7 +133,7 @@ impl Scene<'_> {
     }
 
     pub(super) fn bytes(&self) -> Result<Vec<u8>, SpecError> {
-        let read = self.trust.read_named(self.folder(), self.path);
+        let read = self.trust.check_given(self.path).and_then(|()| self.trust.read_named(self.folder(), self.path));
         read.map_err(|e| self.fault(None, format!("cannot be read: {e}"), "check the path"))
     }
 

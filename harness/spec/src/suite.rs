@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use walkdir::WalkDir;
+
 use super::build::{Loaded, name_of, unread};
 use super::cases::{Variants, variants};
 use super::tree::tree;
+use super::trust::fixed_part;
 use super::{Case, Faults, Source, Spec, SpecError, Trust};
 use crate::procedures::known;
 
@@ -121,16 +124,48 @@ fn files(path: &Path, trust: Trust) -> Result<Vec<PathBuf>, SpecError> {
     let Some(pattern) = path.to_str().filter(|p| !path.exists() && p.contains(['*', '?', '['])) else {
         return Ok(vec![path.to_owned()]);
     };
-    let matches = glob::glob(pattern).map_err(|e| SpecError::of(path, format!("is no pattern: {e}"), "give a file"))?;
-    let found: Vec<PathBuf> = matches.filter_map(Result::ok).collect(); // in alphabetical order
+    let found = match trust {
+        Trust::Own => glob::glob(pattern).map(|found| found.filter_map(Result::ok).collect()), // in alphabetical order
+        Trust::Stranger | Trust::Bundled => matches_without_links(path),
+    };
+    let found: Vec<PathBuf> = found.map_err(|e| SpecError::of(path, format!("is no pattern: {e}"), "give a file"))?;
     if found.is_empty() {
         return Err(SpecError::of(path, "matches no file", "check the pattern"));
     }
     Ok(found)
 }
 
+/// What a pattern matches where no linked folder is followed: links may lead elsewhere, or in circles. If only links
+/// match the beginning of the pattern, the first of them is returned, and then refused by its reader.
+fn matches_without_links(path: &Path) -> Result<Vec<PathBuf>, glob::PatternError> {
+    let (folder, pattern) = fixed_part(path);
+    let parts: Vec<String> = pattern.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
+    let whole = glob::Pattern::new(&parts.join("/"))?;
+    let beginnings =
+        (1..parts.len()).map(|n| glob::Pattern::new(&parts[..n].join("/"))).collect::<Result<Vec<_>, _>>()?;
+    let depth = if parts.iter().any(|part| part == "**") { usize::MAX } else { parts.len() };
+    let (mut found, mut link) = (vec![], None);
+    for entry in WalkDir::new(&folder).min_depth(1).max_depth(depth).sort_by_file_name().into_iter().flatten() {
+        let below = entry.path().strip_prefix(&folder).unwrap_or(entry.path());
+        // As patterns on the command line are written, without `./`.
+        let shown = if folder == Path::new(".") { below } else { entry.path() };
+        if whole.matches_path_with(below, BETWEEN_SLASHES) {
+            found.push(shown.to_owned());
+        } else if link.is_none() && entry.path_is_symlink() {
+            let is_on_the_way = beginnings.iter().any(|part| part.matches_path_with(below, BETWEEN_SLASHES));
+            link = is_on_the_way.then(|| shown.to_owned());
+        }
+    }
+    Ok(if found.is_empty() { link.into_iter().collect() } else { found })
+}
+
+/// A wildcard matches no `/`, as in a shell.
+const BETWEEN_SLASHES: glob::MatchOptions =
+    glob::MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: false };
+
 /// The YAML files of a folder that are specs, by name; tables and the like beside them are left alone.
 fn specs_of(folder: &Path, trust: Trust) -> Result<Vec<PathBuf>, SpecError> {
+    trust.check_given(folder).map_err(|e| unreadable(folder, &e))?;
     let mut specs = vec![];
     for entry in std::fs::read_dir(folder).map_err(|e| unreadable(folder, &e))? {
         let path = entry.map_err(|e| unreadable(folder, &e))?.path();

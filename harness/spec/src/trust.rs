@@ -79,13 +79,18 @@ impl Trust {
 
     /// The bytes of a spec or policy; a stranger's is no link to somewhere else, nor does it lie in a linked folder.
     pub fn read_spec(self, path: &Path) -> io::Result<Vec<u8>> {
-        self.check_name(path)?;
-        if let Some(link) = link_in(path).filter(|_| self != Self::Own) {
-            let is_file = std::path::absolute(path).is_ok_and(|whole| whole == link);
-            let what = if is_file { "it is a link".to_owned() } else { format!("{} is a link", link.display()) };
-            return Err(io::Error::new(io::ErrorKind::PermissionDenied, what));
-        }
+        self.check_given(path)?;
         read_bounded(path, self.limits().spec_bytes)
+    }
+
+    /// Refuses a file that the command line names, of a stranger, if it is a link, lies in a linked folder, or has a
+    /// name that does not print.
+    pub fn check_given(self, path: &Path) -> io::Result<()> {
+        self.check_name(path)?;
+        let Some(link) = link_in(path).filter(|_| self != Self::Own) else { return Ok(()) };
+        let is_file = std::path::absolute(path).is_ok_and(|whole| whole == link);
+        let what = if is_file { "it is a link".to_owned() } else { format!("{} is a link", link.display()) };
+        Err(io::Error::new(io::ErrorKind::PermissionDenied, what))
     }
 
     /// Refuses a stranger's name of a file that would begin a line of a log, or be a command to a terminal.
@@ -156,8 +161,8 @@ impl Resolve for ForeignPath {
     }
 }
 
-/// What of it is no pattern, and the rest. A path of a file that is there is none.
-fn fixed_part(path: &Path) -> (PathBuf, PathBuf) {
+/// The folder that a pattern begins with, and the rest of it. A path of a file that is there is no pattern.
+pub(super) fn fixed_part(path: &Path) -> (PathBuf, PathBuf) {
     if path.exists() {
         return (path.to_owned(), PathBuf::new());
     }

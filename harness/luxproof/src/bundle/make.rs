@@ -48,7 +48,9 @@ pub struct BundleSummary {
 /// A report of a stranger names specs and policies below the current folder alone.
 pub fn make(run: &Path, out: &Path, licence: Option<&str>, trust: Trust) -> Result<BundleSummary, BundleError> {
     let shown = run.display().to_string();
-    let report = luxproof_report_file::read(&run.join(REPORT_FILE))?;
+    let file = run.join(REPORT_FILE);
+    trust.check_given(&file).map_err(|e| FileError::of(&file, e))?;
+    let report = luxproof_report_file::read(&file)?;
     let request = report.request.clone().ok_or_else(|| BundleError::NoRequest { run: shown.clone() })?;
     let sources = sources(&report, &shown, trust)?;
     let Layout { mut places, specs } = Layout::of(&sources)?;

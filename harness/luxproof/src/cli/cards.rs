@@ -147,6 +147,7 @@ fn source(path: &Path, no_bundle: bool, trust: Trust) -> Result<Source, Diagnost
         let bundle = if no_bundle { BundleSource::None } else { BundleSource::Opened(Box::new(opened)) };
         return Ok(Source { run, report, file, bundle });
     }
+    trust.check_given(&report_file(path)).map_err(|e| FileError::of(&report_file(path), e)).into_diagnostic()?;
     let bytes = fs::metadata(report_file(path)).map_or(0, |metadata| metadata.len());
     if trust != Trust::Own && bytes > bundle::MAX_FOREIGN_REPORT_BYTES {
         let most = bundle::MAX_FOREIGN_REPORT_BYTES >> 20;
@@ -281,6 +282,7 @@ fn add(args: &AddArgs, engines: &EngineRoot, trust: Trust) -> Result<Exit, Diagn
         return Err(miette!("--trusted and --untrusted (or LUXPROOF_UNTRUSTED) contradict each other"));
     }
     let of_bundle = if args.trusted { Trust::Own } else { Trust::Bundled };
+    super::refuse_links(&args.site, trust)?;
     SiteFolder::open(&args.site).into_diagnostic()?;
     let (published, mut sources) = read_site(&args.site)?;
     let opened = Opened::read(&args.bundle, of_bundle).map_err(refused)?;

@@ -70,14 +70,14 @@ pub(super) fn reproduce(
         if !is_standard {
             return Err(miette!("--printed is of `cie171`, and this is {}", args.what.display()));
         }
-        return judge_copy(copy, args.format);
+        return judge_copy(copy, trust, args.format);
     }
     if is_standard {
         print(standard_tables::TEMPLATE)?;
         return Ok(Exit::Passed);
     }
     if let Some(file) = study::study_file(&args.what) {
-        return explain_study(&file, args.format);
+        return explain_study(&file, trust, args.format);
     }
     if bundle::is_bundle(&args.what) {
         return again(args, site, trust);
@@ -92,8 +92,8 @@ pub(super) fn reproduce(
 const STANDARD: &str = "cie171";
 
 /// Judges a user's copy of the standard's printed tables; exit 1 if a cell is wrong.
-fn judge_copy(copy: &Path, format: TextOrJson) -> Result<Exit, Diagnostic> {
-    let judgement = standard_tables::judge_copy(copy).map_err(luxproof_console::diagnose)?;
+fn judge_copy(copy: &Path, trust: Trust, format: TextOrJson) -> Result<Exit, Diagnostic> {
+    let judgement = standard_tables::judge_copy(copy, trust).map_err(luxproof_console::diagnose)?;
     print(&match format {
         TextOrJson::Terminal => copy_text(&judgement),
         TextOrJson::Json => json(&judgement)?,
@@ -125,8 +125,8 @@ fn copy_text(judgement: &CopyJudgement) -> String {
 }
 
 /// Explains the published deviations of a study; exit 4 if some stay open.
-fn explain_study(file: &Path, format: TextOrJson) -> Result<Exit, Diagnostic> {
-    let explanation = study::explain(file).map_err(luxproof_console::diagnose)?;
+fn explain_study(file: &Path, trust: Trust, format: TextOrJson) -> Result<Exit, Diagnostic> {
+    let explanation = study::explain(file, trust).map_err(luxproof_console::diagnose)?;
     print(&match format {
         TextOrJson::Terminal => study_text(&explanation),
         TextOrJson::Json => json(&explanation)?,

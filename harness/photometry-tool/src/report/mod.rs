@@ -55,13 +55,13 @@ pub(super) fn run(args: &ReportArgs, trust: Trust) -> Result<Exit, Diagnostic> {
     console::print(&if args.json { console::json(&figures)? } else { figures.to_string() })?;
     if let Some(folder) = &args.svg {
         let name = args.file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        save(&folder.join("polar.svg"), &polar::diagram(&name, &photometry))?;
+        save(&folder.join("polar.svg"), &polar::diagram(&name, &photometry), trust)?;
         match isocandela::diagram(&name, &photometry) {
-            Ok(svg) => save(&folder.join("isocandela.svg"), &svg)?,
+            Ok(svg) => save(&folder.join("isocandela.svg"), &svg, trust)?,
             Err(reason) => console::complain(&format!("isocandela.svg is not drawn: {reason}")),
         }
         match cone::diagram(&name, &photometry) {
-            Ok(svg) => save(&folder.join("cone.svg"), &svg)?,
+            Ok(svg) => save(&folder.join("cone.svg"), &svg, trust)?,
             Err(reason) => console::complain(&format!("cone.svg is not drawn: {reason}")),
         }
     }

@@ -242,7 +242,8 @@ impl Workload {
     fn read(path: &Path, trust: Trust) -> Result<Self, Diagnostic> {
         let shown = path.display();
         let most = if trust == Trust::Own { MAX_KEPT_BYTES } else { MAX_FOREIGN_BYTES };
-        let bytes = files::read_bounded(path, most).map_err(|source| FileError::of(path, source)).into_diagnostic()?;
+        let bytes = trust.check_given(path).and_then(|()| files::read_bounded(path, most));
+        let bytes = bytes.map_err(|source| FileError::of(path, source)).into_diagnostic()?;
         let plan: Self = foreign_json::from_slice(&bytes).map_err(|error| {
             let why = quoted(&error.to_string());
             miette!(help = "give what `luxproof plan --json` prints", "{shown} is no plan: {why}")
