@@ -118,6 +118,7 @@ impl Judge<'_> {
             // The family is a slice of all comparisons: there may be a million, too many to move about.
             let family = comparisons.len();
             let largest = largest_portion(recording);
+            let mut without_tolerance = vec![];
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.reading(k, &target.id);
                 let engine = &recording.key.engine;
@@ -131,8 +132,20 @@ impl Judge<'_> {
                     comparisons.push(self.comparison(task, (recording, k), largest, None));
                 }
                 for reference in references {
-                    comparisons.push(self.comparison(task, (recording, k), largest, Some(reference)));
+                    let comparison = self.comparison(task, (recording, k), largest, Some(reference));
+                    if comparison.reference.as_ref().is_some_and(|r| r.value == 0.0) && comparison.allowed() == 0.0 {
+                        without_tolerance.push((comparisons.len(), k));
+                    }
+                    comparisons.push(comparison);
                 }
+            }
+            let brightest = comparisons[family..].iter().filter_map(|c| Some(c.reference.as_ref()?.value));
+            let rounding = ROUNDING_SHARE * brightest.fold(0.0, f64::max);
+            for (place, k) in without_tolerance {
+                let comparison = &mut comparisons[place];
+                comparison.tolerance.absolute = rounding;
+                comparison.diagnosis = None;
+                test_comparison(comparison, task, (recording, k));
             }
             self.decide_family(&mut comparisons[family..], &recording.content_sha256);
         }
@@ -225,6 +238,9 @@ impl Judge<'_> {
         comparison
     }
 }
+
+/// Rounding that darkness may show where no tolerance is given for it, as a part of the brightest reference.
+const ROUNDING_SHARE: f64 = 1e-12;
 
 /// Tests the deviation of a comparison that has a reading and a reference.
 fn test_comparison(comparison: &mut Comparison, task: &Task, (recording, k): (&Recording, usize)) {

@@ -177,3 +177,20 @@ fn a_hand_method_is_compared_with_what_it_claims_and_decides_no_run() {
         assert_eq!(compared.iter().find(|c| c.key.engine == "iesna").unwrap().verdict, verdict, "{factor}");
     }
 }
+
+#[test]
+fn darkness_passes_up_to_rounding_where_a_spec_gives_no_absolute_tolerance() {
+    let relative_only = luxproof_spec::ToleranceOverride { relative: 0.01, ..Default::default() };
+    let overrides =
+        std::collections::BTreeMap::from([(luxproof_model::ProcedureId::IndirectIlluminance, relative_only)]);
+    let judge = Judge { overrides: &overrides, ..built_in() };
+    let (task, exact) = (task(2), recording("simulator", &[Estimate::exact(100.0), Estimate::exact(0.0)]));
+    let verdict = |dark: f64, bound: f64| {
+        let read = Estimate { value: dark, uncertainty: Uncertainty::Bound(bound) };
+        let subject = recording("radiance", &[Estimate::exact(100.0), read]);
+        judge.compare_one(&task, &subject, &[&exact, &subject]).into_iter().map(|c| c.verdict).collect::<Vec<_>>()
+    };
+    assert_eq!(verdict(0.0, 7e-12), [Verdict::Pass, Verdict::Pass]);
+    assert_eq!(verdict(1e-9, 0.0), [Verdict::Pass, Verdict::Fail]);
+    assert_eq!(verdict(0.0, 0.1), [Verdict::Pass, Verdict::Undecided]);
+}
