@@ -243,6 +243,9 @@ pub(super) fn variance(budget: &ErrorBudget, is_chosen: impl Fn(Source) -> bool)
     budget.components.iter().filter(|part| is_chosen(part.source)).map(|part| part.uncertainty.powi(2)).sum()
 }
 
+/// Few samples make a coverage factor large; further ones bring it down to this.
+const COVERAGE_FACTOR_OF_MANY_SAMPLES: f64 = 2.1;
+
 /// How many times its samples an undecided comparison may need; `None` where it is decided or not sampled.
 ///
 /// It serves to choose points, and is too uncertain to be shown. The deviation is the present one. Where no number of samples would decide that, it is the nearest deviation that the
@@ -261,10 +264,11 @@ pub(super) fn sampling_factor(comparison: &Comparison) -> Option<f64> {
         return None;
     }
     let allowed = comparison.tolerance.around(comparison.reference.as_ref()?.value);
+    let coverage_factor = budget.coverage_factor.min(COVERAGE_FACTOR_OF_MANY_SAMPLES);
     let (now, reach) = (allowed - deviation.abs(), budget.coverage_factor * sampled.sqrt());
     // With further samples the deviation moves, at most by its own error and at most to zero.
     let ways = [now.abs(), (now + reach).min(allowed), reach - now];
-    let variances = ways.into_iter().filter(|way| *way > 0.0).map(|way| (way / budget.coverage_factor).powi(2) - fixed);
+    let variances = ways.into_iter().filter(|way| *way > 0.0).map(|way| (way / coverage_factor).powi(2) - fixed);
     let needed = variances.into_iter().find(|needed| *needed > 0.0);
     Some(needed.map_or(f64::INFINITY, |needed| (sampled / needed).max(1.0)))
 }

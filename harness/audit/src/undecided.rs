@@ -192,6 +192,17 @@ mod tests {
         assert_eq!(reason(Uncertainty::Exact, 0.0), "", "what is decided needs no reason");
     }
 
+    #[test]
+    fn few_samples_are_the_obstacle_where_many_would_decide() {
+        let reference = Estimate { value: 1.0, uncertainty: Uncertainty::Bound(0.0104) };
+        let subject = Estimate { value: 1.01, uncertainty: Uncertainty::sampled(0.008, Some(3.0)) };
+        let all = [recording("simulator", &[reference]), recording("radiance", &[subject])];
+        let mut compared = built_in().compare(&task(1), &[&all[0], &all[1]]);
+        explain_undecided(&mut compared, &[], &[], BUDGET);
+        let reason = compared.iter().find(|c| c.key.engine == "radiance").and_then(|c| c.diagnosis.clone());
+        assert!(reason.as_deref().is_some_and(|text| text.contains("by the time limit")), "{reason:?}");
+    }
+
     /// The reasons of a reading near the edge that reached the requested error and of one that did not.
     fn reasons_of_two(cut_to: Option<f64>) -> Vec<String> {
         let exact = recording("simulator", &[Estimate::exact(1.0); 2]);
