@@ -117,12 +117,13 @@ const KINDS: [(&str, bool, FaultSampler); 17] = [
         let seed = random.u64(..);
         Some(control(move |m| relight(m, |scene| scene.luminaires.iter_mut().for_each(|l| scatter_table(l, seed)))))
     }),
-    ("control: reflected light alone brighter", false, |_, random| {
+    ("reflected light alone brighter", true, |_, random| {
         let factor = 1.03 + 0.3 * random.f64();
-        Some(control(move |m| {
+        let brighter = control(move |m| {
             let is_reflected = matches!(m.task.transport, Transport::Indirect(_));
             m.right.iter().map(|r| if is_reflected { factor * r } else { *r }).collect()
-        }))
+        });
+        Some(InjectedFault { words: &["in reflected light alone"], ..brighter })
     }),
     ("control: scatter not stated", false, |_, random| {
         let seed = random.u64(..);

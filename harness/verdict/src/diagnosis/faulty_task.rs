@@ -26,10 +26,10 @@ const MAX_CORRECTION: f64 = 0.25;
 const WORK_BEHIND_BOXES: u64 = 20;
 /// Cost of a luminous opening seen from a meter: its integral takes milliseconds.
 const WORK_OF_OPENING: u64 = 20_000;
-/// Cost of the simulator's reflected light of a luminaire.
-const FINE_WORK_PER_LUMINAIRE: u64 = 1_000_000;
-/// Additional cost for each meter, because many meters need finer solutions.
-const FINE_WORK_PER_METER: u64 = 10_000;
+/// Cost of the simulator's reflected light of a scene without its luminaires and meters.
+const FINE_WORK_PER_SCENE: u64 = 1_000_000;
+const FINE_WORK_PER_LUMINAIRE: u64 = 250_000;
+const FINE_WORK_PER_METER: u64 = 4_000;
 /// Steps from meter to meter of a grid agree to this many meters.
 const MAX_STEP_DIFFERENCE_M: f64 = 1e-6;
 
@@ -490,7 +490,7 @@ fn count_work(task: &Task, sensors: u64, fidelity: Fidelity, has_moved_meters: b
     let reflected = match fidelity {
         _ if !is_bare(scene) => 0,
         Fidelity::Rough => PatchRadiosity::count_work(luminaires, if has_moved_meters { sensors } else { 0 }),
-        Fidelity::Fine => (FINE_WORK_PER_LUMINAIRE + FINE_WORK_PER_METER * sensors) * luminaires,
+        Fidelity::Fine => FINE_WORK_PER_SCENE + FINE_WORK_PER_LUMINAIRE * luminaires + FINE_WORK_PER_METER * sensors,
     };
     match task.transport {
         Transport::Direct => direct,

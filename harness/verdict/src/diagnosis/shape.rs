@@ -49,14 +49,17 @@ fn place(luminaire: &Luminaire, k: usize, target: &Target) -> Option<Place> {
 }
 
 /// Finds readings that are the same at every meter, where the right ones differ.
+///
+/// Where light is the same everywhere, as in a furnace, such readings show nothing.
 pub(super) fn find_same_everywhere(sheet: &EngineReadings) -> Option<(Cause, usize)> {
     let informative: Vec<usize> = (0..sheet.read.len()).filter(|k| sheet.uncertainty[*k].is_finite()).collect();
     let mean = informative.iter().map(|k| sheet.read[*k]).sum::<f64>() / informative.len() as f64;
+    let right_mean = informative.iter().map(|k| sheet.right[*k]).sum::<f64>() / informative.len() as f64;
     let (mut chi_squared, mut before, mut differing) = (0.0, 0.0, 0);
     for &k in &informative {
         let (read, right) = (sheet.read[k], sheet.right[k]);
         chi_squared += ((read - mean) / sheet.sigma(k, mean)).powi(2);
-        differing += usize::from((right - mean).abs() > MIN_SPREAD * mean.max(right));
+        differing += usize::from((right - right_mean).abs() > MIN_SPREAD * right_mean);
         let off = 100.0 * (read / right - 1.0).abs();
         if off.is_finite() {
             before = f64::max(before, off);

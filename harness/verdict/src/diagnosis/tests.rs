@@ -272,6 +272,16 @@ fn what_no_fault_does_is_left_unnamed() {
     assert_eq!(found, []);
 }
 
+#[test]
+fn readings_that_are_rightly_the_same_everywhere_show_no_shape() {
+    let furnace: Vec<Task> = known::tasks().into_iter().filter(|t| t.procedure == ProcedureId::Furnace).collect();
+    let squared = causes(&furnace, &|m| m.right.iter().map(|r| r * r).collect());
+    assert!(squared.iter().all(|c| c.id != "same"), "{squared:?}");
+    let tasks = [skew(Transport::Direct)];
+    let same = causes(&tasks, &|m| vec![m.right[0]; m.right.len()]);
+    assert_eq!(same.iter().map(|c| c.id).collect_vec(), ["same"], "{same:?}");
+}
+
 /// Readings as if all surfaces reflected more, except for a part of a percent that only fine readings show.
 fn judged_brighter(error: f64, tasks: &[Task]) -> Vec<Comparison> {
     let brighter = |m: &Model| {
