@@ -61,3 +61,60 @@ fn a_page_that_takes_jobs_one_after_the_other_reads_as_many_do() {
     let engine = Web(Library::Three);
     shared_tests::one_process_that_takes_jobs_one_after_the_other_reads_as_many_do(&engine, &[job(), other], order);
 }
+
+/// A browser that opens pages and answers nothing but an error, as Babylon's loader does at files with tilt tables.
+const BROKEN_BROWSER: &str = r#"
+const page = {
+  on() {}, async route() {}, async goto() {}, async waitForFunction() {}, async close() {},
+  async evaluate(_, about) { if (about) throw new Error("its loader takes no tilt tables\nat page.js:1"); return false; },
+};
+exports.chromium = { launch: async () => ({ on() {}, newPage: async () => page, close: async () => {} }) };
+"#;
+
+/// The driver once waited for its standard input to close, which the run keeps open: each such job took its whole time limit.
+#[test]
+fn a_page_that_throws_ends_its_driver_at_once_though_more_jobs_may_come() {
+    use std::io::{Read as _, Write as _};
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    };
+    write("packages/package.json", "{}");
+    write("packages/node_modules/playwright-core/index.js", BROKEN_BROWSER);
+    write("packages/node_modules/babylon/package.json", r#"{"version": "9"}"#);
+    write(DRIVER.0, DRIVER.1);
+    write("job.json", r#"{"package": "babylon", "page": "page.js", "imports": {}, "lamps": []}"#);
+    let node = fixtures::test_root_of(&Web(Library::Babylon)).node().unwrap_or_else(|| "node".into());
+    let mut driver = Command::new(node)
+        .args([DRIVER.0, "--serve", "packages", "no-browser"])
+        .current_dir(folder.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Held open, as a run does that has more jobs.
+    let mut input = driver.stdin.take().unwrap();
+    input.write_all(b"{\"job\": \"job.json\"}\n").unwrap();
+    input.flush().unwrap();
+    let begun = Instant::now();
+    let ended = loop {
+        if let Some(status) = driver.try_wait().unwrap() {
+            break Some(status);
+        }
+        if begun.elapsed() > Duration::from_secs(60) {
+            driver.kill().unwrap();
+            break None;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let mut said = String::new();
+    driver.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert_eq!(ended.and_then(|status| status.code()), Some(1), "{said}");
+    assert_eq!(said.trim(), "its loader takes no tilt tables");
+    drop(input);
+}
