@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use luxproof_model::ProcedureId;
+use luxproof_model::{EngineName, ProcedureId};
 use luxproof_spec::{Source, SpecError, Trust};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -40,10 +40,22 @@ pub struct Capability {
     /// Whether only engines count that parse the photometric file themselves.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub reads_files: bool,
+    /// Engines that get from luxproof what the capability asks for: their right values show nothing, and their faults count.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_shown_by: Vec<NotShown>,
     /// All count: the worst decides.
     pub cases: Vec<CaseSelector>,
     /// With fewer public cases that have values, a cell says `not tested`, unless one of them is wrong.
     pub minimum_cases: usize,
+}
+
+/// An engine, and why its right values do not show a capability.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NotShown {
+    /// Without a release.
+    pub engine: String,
+    pub why: String,
 }
 
 /// Procedures of a case.
@@ -104,6 +116,11 @@ impl Capability {
     /// Whether a procedure of a case shows it.
     pub fn is_shown_by(&self, case: &str, procedure: ProcedureId) -> bool {
         self.cases.iter().any(|selector| selector.selects(case, procedure))
+    }
+
+    /// Why right values of an engine do not show it; `None` if they do.
+    pub fn why_not_shown_by(&self, engine: &EngineName) -> Option<&str> {
+        self.not_shown_by.iter().find(|not| not.engine == engine.family()).map(|not| not.why.as_str())
     }
 
     /// The number of cases, each once.

@@ -4,12 +4,12 @@ use std::collections::{BTreeSet, HashSet};
 use std::fmt;
 
 use itertools::Itertools;
-use luxproof_model::FailureKind;
 use luxproof_model::numbers::plural;
+use luxproof_model::{FailureKind, ProcedureId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Capability, CaseEvidence, Deviation, Measurement, Outcome, Remark};
+use crate::{Capability, CaseEvidence, Deviation, Measurement, Outcome, PassLimit, Remark};
 
 /// Cases that a text lists by name.
 const LISTED_CASES: usize = 3;
@@ -28,6 +28,9 @@ pub struct Cell {
     /// The first cases of the capability that no run has, at most 20.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
+    /// How far its points may be from their references, each limit once, the narrowest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<PassLimit>,
     /// Public against hidden cases; null without hidden ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread: Option<Spread>,
@@ -81,11 +84,19 @@ pub struct Place {
     /// Null where no single point shows it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub meter: Option<String>,
+    /// The scene of known answer, where the case is `calibration`: all of them have this name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<ProcedureId>,
 }
 
 impl Place {
     fn of(evidence: &CaseEvidence, meter: Option<String>) -> Self {
-        Self { case: evidence.case.clone(), seed: evidence.hidden.as_ref().map(|variant| variant.seed), meter }
+        Self {
+            case: evidence.case.clone(),
+            seed: evidence.hidden.as_ref().map(|variant| variant.seed),
+            meter,
+            scene: Some(evidence.procedure).filter(|procedure| procedure.is_calibration()),
+        }
     }
 
     /// The case in one or two words.
@@ -104,6 +115,9 @@ impl fmt::Display for Place {
             write!(f, "{meter} of ")?;
         }
         f.write_str(&self.case)?;
+        if let Some(scene) = self.scene {
+            write!(f, " ({})", scene.name())?;
+        }
         self.seed.map_or(Ok(()), |seed| write!(f, " (hidden, seed {seed})"))
     }
 }
@@ -205,12 +219,13 @@ impl Standing {
         }
     }
 
-    /// The cell in a few words: `within 0.84 %`, `wrong, up to 12 %`, `crashes`, `not tested`.
+    /// The cell in a few words: `within 0.84 %`, `wrong, off by up to 12 %`, `crashes`, `not tested`.
     pub fn headline(&self) -> String {
         let bound = self.worst().map(|worst| worst.bound_text());
         match (self, bound) {
             (Self::Accurate { .. }, Some(bound)) => format!("within {bound}"),
-            (Self::Limited { .. } | Self::Wrong { .. }, Some(bound)) => format!("{}, up to {bound}", self.word()),
+            (Self::Limited { .. }, Some(bound)) => format!("limited, up to {bound}"),
+            (Self::Wrong { .. }, Some(bound)) => format!("wrong, off by up to {bound}"),
             (Self::Failed { failure, .. }, _) => failure_words(*failure).to_owned(),
             _ => self.word().to_owned(),
         }
@@ -256,7 +271,20 @@ pub fn judge(capability: &Capability, evidence: &[CaseEvidence]) -> Cell {
         hidden_variants: hidden.iter().filter(|e| e.measurement().is_some()).count(),
         points: evidence.iter().filter_map(CaseEvidence::measurement).map(|m| m.verdicts.all).sum(),
         missing,
+        limits: PassLimit::all_of(
+            evidence.iter().filter_map(CaseEvidence::measurement).flat_map(|m| m.limits.iter().cloned()),
+        ),
         spread,
+    }
+}
+
+impl Cell {
+    /// Its worst point, if hidden variants exist and none is of the case of that point: then the page of hidden variants lacks it.
+    pub fn worst_without_variant(&self) -> Option<&WorstPoint> {
+        let spread = self.spread.as_ref()?;
+        let worst = self.standing.worst_point()?;
+        let compared = [&spread.public, &spread.hidden].into_iter().flatten().map(|of| of.deviation.bound());
+        (worst.at.seed.is_none() && worst.deviation.bound() > compared.fold(0.0, f64::max)).then_some(worst)
     }
 }
 
@@ -415,13 +443,18 @@ fn without_answer(evidence: &[CaseEvidence], spread: Option<&Spread>) -> Option<
 }
 
 /// A cell with too few values for a claim.
+///
+/// What the renderer declines is known: without any values it does not support the capability, and next to enough values and
+/// declined cases together it is limited. Only what was not run is not tested.
 fn without_values(
     capability: &Capability,
     public: &[&CaseEvidence],
     tested: usize,
     missing: &[String],
 ) -> Option<Standing> {
-    if tested >= capability.minimum_cases {
+    let answered = public.iter().filter(|e| !matches!(e.outcome, Outcome::NotRun { .. }));
+    let answered = answered.map(|e| e.case.as_str()).unique().count();
+    if tested >= capability.minimum_cases || (tested > 0 && answered >= capability.minimum_cases) {
         return None;
     }
     let declined = public.iter().filter_map(|e| match &e.outcome {
@@ -429,11 +462,7 @@ fn without_values(
         Outcome::Measured(_) | Outcome::NotRun { .. } | Outcome::Failed { .. } => None,
     });
     let declined: Vec<&str> = declined.unique().collect();
-    if tested == 0
-        && !declined.is_empty()
-        && missing.is_empty()
-        && public.iter().all(|e| !matches!(e.outcome, Outcome::NotRun { .. }))
-    {
+    if tested == 0 && !declined.is_empty() {
         return Some(Standing::NotSupported { reason: declined.join("; ") });
     }
     let not_run = public.iter().filter_map(|e| match &e.outcome {
@@ -641,7 +670,7 @@ mod tests {
         let a = MadeCase::new("a").judged(0.5, 0.0, Verdict::Fail, Some("C is turned by 180 degrees"));
         let found = cell(&three(a), 3);
         assert!(found.standing.explanation().starts_with("C is turned by 180 degrees (in 1 of 3 cases: a"));
-        assert_eq!(found.standing.headline(), "wrong, up to 50 %");
+        assert_eq!(found.standing.headline(), "wrong, off by up to 50 %");
     }
 
     #[test]
@@ -665,6 +694,93 @@ mod tests {
         // What had no time says nothing about the engine.
         let late = cell(&three(MadeCase::new("a").failing("time_up", "no time was left")), 3);
         assert!(matches!(late.standing, Standing::NotTested { .. }), "{late:?}");
+    }
+
+    #[test]
+    fn what_is_declined_is_not_supported_and_what_was_not_run_is_not_tested_whatever_other_cases_are() {
+        // Some cases were declined, and no run has the others.
+        let found = cell(&[MadeCase::new("a").unsupported()], 2);
+        assert_eq!(found.standing, Standing::NotSupported { reason: "only boxes".to_owned() });
+        // Nothing was run.
+        let found = cell(&[MadeCase::new("a").not_run(), MadeCase::new("b").not_run()], 2);
+        assert!(matches!(found.standing, Standing::NotTested { .. }), "{found:?}");
+        // The clock left no time for one, and the other is declined.
+        let found = cell(&[MadeCase::new("a").unsupported(), MadeCase::new("b").not_run()], 2);
+        assert!(matches!(found.standing, Standing::NotSupported { .. }), "{found:?}");
+        // Values of one case and two declined ones are no lack of runs.
+        let found = cell(
+            &[MadeCase::new("a").off(0.0, 0.0), MadeCase::new("b").unsupported(), MadeCase::new("c").unsupported()],
+            3,
+        );
+        let Standing::Limited { what, .. } = &found.standing else { panic!("{found:?}") };
+        assert_eq!(what, "it declines: only boxes");
+        // One of the two was not run: two answers of at least three are too few.
+        let found = cell(
+            &[MadeCase::new("a").off(0.0, 0.0), MadeCase::new("b").unsupported(), MadeCase::new("c").not_run()],
+            3,
+        );
+        assert!(matches!(found.standing, Standing::NotTested { .. }), "{found:?}");
+    }
+
+    #[test]
+    fn a_run_that_the_clock_cut_short_decides_nothing_where_its_values_would_be_wrong() {
+        let found = cell(&three(MadeCase::new("a").off(2.54, 0.01).cut_to(0.031)), 3);
+        assert_eq!(found.standing.headline(), "no answer in time");
+        assert_eq!(
+            found.standing.explanation(),
+            "the time limit cut it to 3.1 % of its samples, so its values decide nothing (in 1 of 3 cases: a)"
+        );
+        // Values that pass in spite of it do pass, and a fault of a whole run stays one.
+        assert!(matches!(
+            cell(&three(MadeCase::new("a").off(0.0, 0.0).cut_to(0.5)), 3).standing,
+            Standing::Accurate { .. }
+        ));
+        let [a, _, c] = three(MadeCase::new("a").off(2.54, 0.01).cut_to(0.031));
+        let found = cell(&[a, MadeCase::new("b").off(0.5, 0.0), c], 3);
+        assert_eq!(found.standing.headline(), "wrong, off by up to 50 %");
+    }
+
+    #[test]
+    fn a_cell_has_the_pass_limits_of_its_points() {
+        let mut report = report(ENGINE, "1.0", &three(MadeCase::new("a").off(0.0, 0.0)));
+        report.comparisons[1].tolerance = luxproof_model::Tolerance { relative: 0.1, absolute: 0.001 };
+        let found = cell_of(&report, 3);
+        let texts: Vec<String> = found.limits.iter().map(ToString::to_string).collect();
+        assert_eq!(texts, ["1 %", "10 % or 0.001 lx"]);
+    }
+
+    /// The worst point is in a scene that has no variant: the page says which.
+    #[test]
+    fn a_fault_in_a_case_without_a_variant_is_named() {
+        let given = [
+            MadeCase::new("a").off(0.001, 0.0),
+            MadeCase::new("a").hidden(7).off(0.002, 0.0),
+            MadeCase::new("b").off(0.91, 0.0),
+        ];
+        let found = cell(&given, 2);
+        let worst = found.worst_without_variant().unwrap();
+        assert_eq!((worst.at.to_string().as_str(), worst.deviation.value), ("floor[0] of b", 0.91));
+        let even = [MadeCase::new("a").off(0.001, 0.0), MadeCase::new("a").hidden(7).off(0.002, 0.0)];
+        assert_eq!(cell(&even, 1).worst_without_variant(), None);
+        let scene = Place { scene: Some(ProcedureId::Asymmetric), ..worst.at.clone() };
+        assert_eq!(
+            Place { case: "calibration".to_owned(), ..scene }.to_string(),
+            "floor[0] of calibration (asymmetric)"
+        );
+    }
+
+    #[test]
+    fn right_values_of_an_engine_that_was_given_the_answer_show_nothing_and_wrong_ones_do() {
+        let mut capability = capabilities(2).capabilities[0].clone();
+        capability.not_shown_by =
+            vec![crate::NotShown { engine: ENGINE.to_owned(), why: "luxproof gives it the scale".to_owned() }];
+        let judged = |given: &[MadeCase]| {
+            let capabilities = Capabilities { version: 1, capabilities: vec![capability.clone()] };
+            judge(&capability, &evidence_of(&report(ENGINE, "1.0", given), &capabilities)).standing
+        };
+        let right = judged(&three(MadeCase::new("a").off(0.0, 0.0)));
+        assert_eq!(right, Standing::NotSupported { reason: "luxproof gives it the scale".to_owned() });
+        assert!(matches!(judged(&three(MadeCase::new("a").off(0.3, 0.0))), Standing::Wrong { .. }));
     }
 
     #[test]

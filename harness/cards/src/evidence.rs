@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use itertools::Itertools;
+use luxproof_model::numbers::trimmed;
 use luxproof_model::{
     Basis, Bias, CaseRecord, Comparison, DeviationKind, EngineName, FailureKind, HiddenVariant, KnownDeviationOutcome,
     ProcedureId, ReadingKey, Recording, Report, Role, Skip, SkipCause, Verdict,
@@ -10,7 +11,7 @@ use luxproof_model::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Capabilities, Capability, CapabilityId, Deviation, RunId};
+use crate::{Capabilities, Capability, CapabilityId, Deviation, PassLimit, RunId};
 
 /// The name of the scenes of known answer in capabilities.
 const CALIBRATION: &str = "calibration";
@@ -73,6 +74,9 @@ pub struct Measurement {
     pub worst: Option<Deviation>,
     /// Why it is not accurate; empty if every point passes.
     pub remarks: Vec<Remark>,
+    /// How far its points may be from their references, each limit once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub limits: Vec<PassLimit>,
     /// The points with the largest bounds, at most eight.
     pub points: Vec<PointEvidence>,
 }
@@ -224,7 +228,15 @@ impl<'a> ReportIndex<'a> {
         if judged.is_empty() {
             return Some(Outcome::NotRun { reason: "there is no independent reference".to_owned() });
         }
-        Some(Outcome::Measured(self.measurement(recording, &judged)))
+        let measurement = self.measurement(recording, &judged);
+        // Too few samples show no fault: their errors are hardly known.
+        if let Some(part) = recording.cut_to.filter(|_| measurement.has_fault()) {
+            return Some(cut_short(part));
+        }
+        if let Some(why) = capability.why_not_shown_by(&key.engine).filter(|_| !measurement.has_fault()) {
+            return Some(Outcome::Unsupported { reason: why.to_owned() });
+        }
+        Some(Outcome::Measured(measurement))
     }
 
     fn skipped(&self, key: &ReadingKey) -> Option<Outcome> {
@@ -252,6 +264,7 @@ impl<'a> ReportIndex<'a> {
             verdicts: VerdictCounts::of(judged),
             worst: points.first().map(|point| point.deviation),
             remarks,
+            limits: PassLimit::all_of(judged.iter().map(|c| PassLimit::of(c))),
             points: points.into_iter().take(LISTED_POINTS).collect(),
         }
     }
@@ -326,6 +339,21 @@ fn failed(kind: Option<FailureKind>, reason: String, capability: &Capability) ->
         | FailureKind::Nan
         | FailureKind::SilentLoss
         | FailureKind::Garbled => Outcome::Failed { failure: kind, reason },
+    }
+}
+
+/// The outcome of a job that the clock cut to a part of its samples.
+fn cut_short(part: f64) -> Outcome {
+    let reason = format!(
+        "the time limit cut it to {} % of its samples, so its values decide nothing",
+        trimmed(100.0 * part.clamp(0.0, 1.0), 1)
+    );
+    Outcome::Failed { failure: FailureKind::Hang, reason }
+}
+
+impl Measurement {
+    fn has_fault(&self) -> bool {
+        self.remarks.iter().any(|remark| matches!(remark, Remark::Fault { .. }))
     }
 }
 

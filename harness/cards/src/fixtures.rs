@@ -28,6 +28,7 @@ pub(crate) struct MadeCase {
     points: Vec<Comparison>,
     failure: Option<(&'static str, &'static str)>,
     skip: Option<&'static str>,
+    cut_to: Option<f64>,
     pub(crate) title: String,
 }
 
@@ -39,6 +40,7 @@ impl MadeCase {
             points: vec![],
             failure: None,
             skip: None,
+            cut_to: None,
             title: "a case".to_owned(),
         }
     }
@@ -88,6 +90,12 @@ impl MadeCase {
         self
     }
 
+    /// The clock cut its sampling to such a part.
+    pub(crate) fn cut_to(mut self, part: f64) -> Self {
+        self.cut_to = Some(part);
+        self
+    }
+
     pub(crate) fn unsupported(mut self) -> Self {
         self.skip = Some("unsupported");
         self
@@ -132,6 +140,7 @@ pub(crate) fn report(engine: &str, version: &str, given: &[MadeCase]) -> Report 
         }
         let mut recording = Recording::of(key.clone(), "direct".to_owned().try_into().unwrap());
         recording.content_sha256 = format!("content of {}", case.case);
+        recording.cut_to = case.cut_to;
         if let Some((kind, text)) = case.failure {
             recording.failure = Some(text.to_owned());
             recording.failure_kind = serde_json::from_value(Value::from(kind)).unwrap();

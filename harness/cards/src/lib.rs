@@ -10,6 +10,7 @@ mod cell;
 mod deviation;
 mod error;
 mod evidence;
+mod pass_limit;
 mod release_label;
 pub mod site;
 mod site_folder;
@@ -18,7 +19,7 @@ mod slug;
 #[cfg(test)]
 mod fixtures;
 
-pub use capabilities::{Capabilities, Capability, CapabilityId, CaseSelector, EXAMPLE_FILE};
+pub use capabilities::{Capabilities, Capability, CapabilityId, CaseSelector, EXAMPLE_FILE, NotShown};
 pub use cards::{
     CardRun, Cards, CellCard, CellEvidence, Change, ReleaseCard, ReleaseEvidence, RendererCard, RunId, Since,
     Verification,
@@ -28,6 +29,7 @@ pub use cell::{Cell, Place, Spread, Standing, WorstPoint, judge};
 pub use deviation::{Deviation, Measure};
 pub use error::CardsError;
 pub use evidence::{CaseEvidence, Measurement, Outcome, PointEvidence, Remark, VerdictCounts};
+pub use pass_limit::PassLimit;
 pub use release_label::ReleaseLabel;
 pub use site_folder::{SITE_FILE, SiteFolder, SiteFolderError};
 pub use slug::slug;

@@ -1,6 +1,7 @@
 //! The page of a renderer and a capability: for each release the cases, their worst points, and how to repeat them.
 
 use itertools::Itertools;
+use luxproof_model::REPORT_FILE;
 use luxproof_model::numbers::{plural, significant};
 use luxproof_report::{minus, table};
 use maud::{Markup, html};
@@ -67,7 +68,8 @@ fn release_section(cards: &Cards, renderer: &str, release: &ReleaseEvidence, is_
                 (plural(release.cell.hidden_variants, "hidden variant")) ", " (plural(release.cell.points, "comparison"))
                 @if !release.cell.missing.is_empty() { "; in no run: " (release.cell.missing.join(", ")) }
             }
-            @if let Some(spread) = &release.cell.spread { (spread_line(spread)) }
+            (limit_line(cards, renderer, release))
+            @if let Some(spread) = &release.cell.spread { (spread_line(spread, release.cell.worst_without_variant())) }
             @let notes = release.cases.iter().flat_map(|case| &case.notes).unique().take(LISTED_NOTES).collect_vec();
             @if !notes.is_empty() { ul.changes aria-label={ "Notes on " (release.release) } { @for note in notes { li { (note) } } } }
             @if release.is_recorded { p.where { "These are recorded values. This release cannot be run again here, so they are not verified." } }
@@ -87,12 +89,29 @@ fn release_section(cards: &Cards, renderer: &str, release: &ReleaseEvidence, is_
     }
 }
 
-fn spread_line(spread: &Spread) -> Markup {
+/// How far points may be from their references.
+fn limit_line(cards: &Cards, renderer: &str, release: &ReleaseEvidence) -> Markup {
+    let limits = release.cell.limits.iter().map(ToString::to_string).join("; ");
+    let is_own = cards.renderers.iter().any(|card| card.name == renderer && card.is_own);
+    html! {
+        @if !limits.is_empty() {
+            p.where {
+                strong { "Pass limit" } ": " (limits) " (the larger of both). A point passes if its deviation with its expanded uncertainty stays within it."
+                @if is_own { " luxproof's own hand methods are judged by the accuracy that they claim, in public cases and in hidden variants. Beyond it a point is not judged: the cell is limited, never wrong." }
+            }
+        }
+    }
+}
+
+fn spread_line(spread: &Spread, without_variant: Option<&WorstPoint>) -> Markup {
     let seeds: Vec<String> = spread.seeds.iter().map(u64::to_string).collect();
     html! {
         p.where {
             "The same cases, public: " (bound(spread.public.as_ref())) "; hidden (seed " (seeds.join(", ")) "): "
             (bound(spread.hidden.as_ref())) "."
+            @if let Some(worst) = without_variant {
+                " The worst point, " (worst.at) " (" (worst.deviation) "), is in neither: its case has no hidden variant."
+            }
         }
     }
 }
@@ -101,7 +120,7 @@ fn spread_line(spread: &Spread) -> Markup {
 fn bound(worst: Option<&WorstPoint>) -> String {
     worst.map_or_else(
         || "nothing measured".to_owned(),
-        |worst| format!("within {}, worst at {}", worst.deviation.bound_text(), worst.at),
+        |worst| format!("largest error {}, at {}", worst.deviation.bound_text(), worst.at),
     )
 }
 
@@ -208,7 +227,9 @@ fn run_entry(run: &CardRun, release: &ReleaseEvidence) -> Markup {
     let cases = release.cases.iter().filter(|case| case.run == run.id).collect_vec();
     // Scenes of known answer have no spec: every run has them.
     let specs = cases.iter().filter(|case| case.spec != BUILT_IN).map(|case| case.spec.clone()).unique().collect_vec();
-    let command = cases.first().and_then(|case| run.command(&specs, &case.engine));
+    let names =
+        cases.iter().filter(|case| case.spec != BUILT_IN).map(|case| case.reported_as.clone()).unique().collect_vec();
+    let command = cases.first().and_then(|case| run.command(&specs, &names, &case.engine));
     html! {
         p {
             "Run of " (run.started.replace('T', " ").replace('Z', " UTC")) " by luxproof " (run.tool) ". "
@@ -220,7 +241,10 @@ fn run_entry(run: &CardRun, release: &ReleaseEvidence) -> Markup {
                     "Submitted, and run again by the publisher: " (same_bytes) " to the byte, " (within) " within uncertainties. "
                 }
             }
-            @if let Some(report) = &run.report { a href={ (ROOT) (report) } { "Full report with every point and plan" } ". " }
+            @if let Some(report) = &run.report {
+                a href={ (ROOT) (report) } { "Full report with every point and plan" } ", "
+                a href={ (ROOT) (folder(report)) (REPORT_FILE) } { "the same as " code { (REPORT_FILE) } } ". "
+            }
             @if let Some(bundle) = &run.bundle {
                 a href={ (ROOT) (bundle) } { "Bundle" } " with all inputs; "
                 code { "luxproof reproduce " (file_name(bundle)) } " repeats the whole run and compares every value."
@@ -233,6 +257,11 @@ fn run_entry(run: &CardRun, release: &ReleaseEvidence) -> Markup {
             pre.commands tabindex="0" { code { "unzip -q " (run.bundle.as_deref().map_or("bundle.zip", file_name)) " -d bundle && cd bundle\n" (command) } }
         }
     }
+}
+
+/// A path on the site up to its last part.
+fn folder(path: &str) -> &str {
+    &path[..path.len() - file_name(path).len()]
 }
 
 /// The last part of a path on the site.

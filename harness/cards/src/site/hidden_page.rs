@@ -5,7 +5,7 @@ use luxproof_model::numbers::trimmed;
 use maud::{Markup, html};
 
 use super::index::title;
-use super::{frame, shortened};
+use super::{frame, not_published, published, shortened};
 use crate::cards::anchor;
 use crate::{Capability, Cards, CellCard, RendererCard, Spread, WorstPoint};
 
@@ -47,7 +47,7 @@ impl Finding {
     const fn sign(self) -> &'static str {
         match self {
             Self::PublicOnly => "✕",
-            Self::Wider => "≈",
+            Self::Wider => "↑",
             Self::Similar => "=",
         }
     }
@@ -82,8 +82,12 @@ pub(super) fn page(cards: &Cards) -> Markup {
         }
         section aria-labelledby="spread-title" {
             h2 id="spread-title" { "Newest releases" }
-            p { "Each cell has the largest error, uncertainty included, of the public cases that have variants, and that of the variants. It leads to its evidence." }
+            p {
+                "Each cell has the largest error, uncertainty included, of the public cases that have variants, and that of the variants. It leads to its evidence. "
+                "The scenes with known results (" code { "calibration" } ") have no variants: where one of them is worse, the cell says so."
+            }
             (matrix(cards))
+            (not_published(cards, ""))
         }
     };
     frame(cards, "Public cases against hidden variants", "", &[], &content, None)
@@ -127,7 +131,7 @@ fn matrix(cards: &Cards) -> Markup {
                         @for renderer in &cards.renderers { th scope="col" { a href={ "renderers/" (renderer.slug) "/index.html" } { (renderer.name) } (newest(renderer)) } }
                     }
                 }
-                @for (group, capabilities) in &cards.capabilities.capabilities.iter().chunk_by(|c| c.group.as_str()) {
+                @for (group, capabilities) in &published(cards).into_iter().chunk_by(|c| c.group.as_str()) {
                     tbody {
                         tr.group { th scope="rowgroup" colspan=(cards.renderers.len() + 1) { (group) } }
                         @for capability in capabilities { (row(cards, capability)) }
@@ -169,6 +173,7 @@ fn spread_cell(renderer: &RendererCard, cell: &CellCard, anchor: &str) -> Markup
                         (mark(finding)) " " (ratio_text(spread, finding))
                         (side("public", spread.public.as_ref()))
                         (side("hidden", spread.hidden.as_ref()))
+                        @if let Some(worst) = cell.cell.worst_without_variant() { span.since { "worst of all " strong { (worst.deviation.bound_text().replace(" %", "\u{a0}%")) } ", " (shortened(&worst.at.case_text(), CASE_LETTERS)) ", which has no variant" } }
                     }
                 }
             }

@@ -5,9 +5,10 @@ use luxproof_model::numbers::plural;
 use maud::{Markup, PreEscaped, html};
 
 use super::releases::release_data;
-use super::{STATES, frame, hidden_page, legend, shortened, sign};
+use super::{STATES, frame, hidden_page, legend, not_published, published, shortened, sign};
 use crate::cards::anchor;
-use crate::{Capability, Cards, CardsError, CellCard, RendererCard, Since, Standing};
+use crate::pass_limit::summary;
+use crate::{Capability, Cards, CardsError, CellCard, PassLimit, RendererCard, Since, Standing};
 
 const SCRIPT: &str = include_str!("index.js");
 /// Letters of a fault that the matrix shows.
@@ -29,12 +30,18 @@ pub(super) fn page(cards: &Cards) -> Result<Markup, CardsError> {
                 (plural(judged.len(), "renderer")) " in " (plural(releases, "release")) ", judged by closed forms and by an "
                 "independent calculation that states its own error. The worst point of the worst case counts. Each cell leads to its evidence."
             }
+            p.lead {
+                "Each row has its " strong { "pass limit" } ": a point passes if its error, with its expanded uncertainty (about 95 %), "
+                "stays within that part of the right value. "
+                a href="capabilities.html#rule-title" { "The rule" } " and " a href="capabilities.html#words-title" { "the words" } "."
+            }
             (legend())
         }
         section aria-labelledby="matrix-title" {
             h2 id="matrix-title" { "Newest releases" }
             (filters())
             (matrix(cards))
+            (not_published(cards, ""))
             // Data, and no script: the browser runs nothing of it.
             script id="releases" type="application/json" { (PreEscaped(data)) }
         }
@@ -71,7 +78,7 @@ fn matrix(cards: &Cards) -> Markup {
                         @for renderer in &cards.renderers { th scope="col" data-name=(renderer.name.to_lowercase()) { (column_head(renderer)) } }
                     }
                 }
-                @for (group, capabilities) in &cards.capabilities.capabilities.iter().chunk_by(|c| c.group.as_str()) {
+                @for (group, capabilities) in &published(cards).into_iter().chunk_by(|c| c.group.as_str()) {
                     tbody {
                         tr.group { th scope="rowgroup" colspan=(cards.renderers.len() + 1) { (group) } }
                         @for capability in capabilities { (row(cards, capability)) }
@@ -104,12 +111,16 @@ fn column_head(renderer: &RendererCard) -> Markup {
 
 fn row(cards: &Cards, capability: &Capability) -> Markup {
     let text = format!("{} {} {}", capability.group, capability.title, capability.question).to_lowercase();
+    let limit = row_limit(cards, capability);
     html! {
         tr data-text=(text) {
-            th scope="row" { a href={ "capabilities.html#" (capability.id) } { (capability.title) } }
+            th scope="row" {
+                a href={ "capabilities.html#" (capability.id) } { (capability.title) }
+                @if let Some(limit) = &limit { span.since { "pass limit " (limit.replace(" %", "\u{a0}%")) } }
+            }
             @for renderer in &cards.renderers {
                 @match renderer.releases.first().and_then(|release| release.cell(&capability.id)) {
-                    Some(cell) => (matrix_cell(renderer, cell)),
+                    Some(cell) => (matrix_cell(renderer, cell, limit.as_deref())),
                     None => td {},
                 }
             }
@@ -117,8 +128,18 @@ fn row(cards: &Cards, capability: &Capability) -> Markup {
     }
 }
 
-fn matrix_cell(renderer: &RendererCard, cell: &CellCard) -> Markup {
+/// The pass limit of a capability: that of the renderers, or that of luxproof's own solvers where no renderer has values.
+fn row_limit(cards: &Cards, capability: &Capability) -> Option<String> {
+    [false, true].into_iter().find_map(|is_own| {
+        let releases = cards.renderers.iter().filter(|of| of.is_own == is_own).flat_map(|of| &of.releases);
+        let cells = releases.filter_map(|release| release.cell(&capability.id));
+        summary(&PassLimit::all_of(cells.flat_map(|cell| cell.cell.limits.iter().cloned())))
+    })
+}
+
+fn matrix_cell(renderer: &RendererCard, cell: &CellCard, row_limit: Option<&str>) -> Markup {
     let standing = &cell.cell.standing;
+    let own_limit = summary(&cell.cell.limits).filter(|limit| renderer.is_own && Some(limit.as_str()) != row_limit);
     html! {
         td class={ "s-" (standing.key()) } data-renderer=(renderer.name) {
             a.cell href=(cell.page) {
@@ -128,6 +149,7 @@ fn matrix_cell(renderer: &RendererCard, cell: &CellCard) -> Markup {
                     Standing::Failed { reason, .. } | Standing::NotSupported { reason } => span.why { (shortened(reason, SHOWN_LETTERS)) },
                     Standing::Accurate { .. } | Standing::NotTested { .. } => {},
                 }
+                @if let Some(limit) = own_limit { span.why { "a hand method, judged by the accuracy that it claims: " (limit.replace(" %", "\u{a0}%")) } }
                 @if let Some(place) = standing.place() { span.since { "worst: " (shortened(&place.case_text(), CASE_LETTERS)) } }
                 @if let Some(since) = renderer.since(&cell.capability) { (since_line(since)) }
             }

@@ -13,10 +13,13 @@ mod renderer_page;
 #[cfg(test)]
 mod tests;
 
+use std::collections::HashSet;
+
+use itertools::Itertools;
 use luxproof_report::{BASE_STYLE, minus};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::{Cards, CardsError, CellEvidence, Standing};
+use crate::{Capability, CapabilityId, Cards, CardsError, CellEvidence, Standing};
 
 /// The file with every cell, in the root of the site.
 pub const CARDS_FILE: &str = "cards.json";
@@ -110,6 +113,34 @@ fn frame(
     }
 }
 
+/// The capabilities that some release was tested for, in their order: a row without any says nothing about a renderer.
+fn published(cards: &Cards) -> Vec<&Capability> {
+    let releases = cards.renderers.iter().flat_map(|renderer| &renderer.releases);
+    let cells = releases.flat_map(|release| &release.cells);
+    let tested: HashSet<&CapabilityId> =
+        cells.filter(|cell| !cell.cell.standing.is_untested()).map(|cell| &cell.capability).collect();
+    cards.capabilities.capabilities.iter().filter(|capability| tested.contains(&capability.id)).collect()
+}
+
+/// The capabilities without a row, as a paragraph below a table.
+fn not_published(cards: &Cards, root: &str) -> Markup {
+    let rows: HashSet<&CapabilityId> = published(cards).into_iter().map(|capability| &capability.id).collect();
+    let missing = cards.capabilities.capabilities.iter().filter(|capability| !rows.contains(&capability.id));
+    let missing = missing.collect_vec();
+    html! {
+        @if !missing.is_empty() {
+            p.where {
+                "Without a row, because the runs of this publication have too few of their cases: "
+                @for (k, capability) in missing.iter().enumerate() {
+                    @if k > 0 { ", " }
+                    a href={ (root) "capabilities.html#" (capability.id) } { (capability.title) }
+                }
+                "."
+            }
+        }
+    }
+}
+
 /// The sign of a state with its word for readers who only hear it.
 fn sign(standing: &Standing) -> Markup {
     html! { span.sign aria-hidden="true" { (standing.sign()) } }
@@ -121,13 +152,18 @@ const STATES: [(&str, &str, &str, &str); 6] = [
         "accurate",
         "✓",
         "within x %",
-        "every point of every case passes; no error is larger than x, uncertainty included",
+        "every point of every case is within its pass limit; no error is larger than x, uncertainty included",
     ),
     ("limited", "≈", "limited", "right within limits that are known, or not decided yet"),
-    ("wrong", "✕", "wrong", "at least one value is wrong; the page names the fault"),
+    (
+        "wrong",
+        "✕",
+        "wrong",
+        "at least one value is beyond its pass limit; x is the largest error; the page names the fault",
+    ),
     ("failed", "!", "fails", "it crashes, gives no answer in time or an unreadable one"),
-    ("unsupported", "–", "not supported", "the renderer refuses it and says why"),
-    ("untested", "·", "not tested", "too few cases were run"),
+    ("unsupported", "–", "not supported", "it has no values: the renderer declines the cases and says why"),
+    ("untested", "·", "not tested", "too few cases were run, for reasons that are not the renderer's"),
 ];
 
 /// What the signs mean.

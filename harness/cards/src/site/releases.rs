@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::{STATES, shortened};
+use super::{STATES, published, shortened};
 use crate::cards::anchor;
 use crate::{Capability, Cards, CardsError, CellCard, RendererCard, Standing};
 
@@ -54,9 +54,9 @@ impl Texts {
 
 /// The data as JSON that may stand in a page: no character of it ends the element.
 pub(super) fn release_data(cards: &Cards) -> Result<String, CardsError> {
-    let capabilities = &cards.capabilities.capabilities;
+    let capabilities = published(cards);
     let mut texts = Texts::default();
-    let renderers = cards.renderers.iter().map(|renderer| renderer_data(renderer, capabilities, &mut texts)).collect();
+    let renderers = cards.renderers.iter().map(|renderer| renderer_data(renderer, &capabilities, &mut texts)).collect();
     let data = ReleaseData {
         states: STATES.iter().map(|(key, sign, _, _)| (*key, *sign)).collect(),
         capabilities: capabilities.iter().map(|capability| capability.id.as_str()).collect(),
@@ -66,7 +66,7 @@ pub(super) fn release_data(cards: &Cards) -> Result<String, CardsError> {
     Ok(serde_json::to_string(&data)?.replace('<', "\\u003c"))
 }
 
-fn renderer_data<'a>(renderer: &'a RendererCard, capabilities: &[Capability], texts: &mut Texts) -> RendererData<'a> {
+fn renderer_data<'a>(renderer: &'a RendererCard, capabilities: &[&Capability], texts: &mut Texts) -> RendererData<'a> {
     let releases = renderer.releases.iter();
     let releases = releases.map(|r| (shortened(r.release.as_str(), RELEASE_LETTERS), anchor(&r.release))).collect();
     let older = renderer.releases.iter().skip(1).map(|release| {

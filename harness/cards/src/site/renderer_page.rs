@@ -5,7 +5,7 @@ use luxproof_model::numbers::plural;
 use maud::{Markup, html};
 
 use super::index::title;
-use super::{Crumb, frame, legend, shortened, sign};
+use super::{Crumb, frame, legend, not_published, published, shortened, sign};
 use crate::cards::anchor;
 use crate::{Capability, Cards, ReleaseCard, RendererCard, Standing};
 
@@ -32,7 +32,7 @@ pub(super) fn page(cards: &Cards, renderer: &RendererCard) -> Markup {
                             @for release in &renderer.releases { th scope="col" { a href={ "#" (anchor(&release.release)) } { (shortened(release.release.as_str(), 24)) } } }
                         }
                     }
-                    @for (group, capabilities) in &cards.capabilities.capabilities.iter().chunk_by(|c| c.group.as_str()) {
+                    @for (group, capabilities) in &published(cards).into_iter().chunk_by(|c| c.group.as_str()) {
                         tbody {
                             tr.group { th scope="rowgroup" colspan=(renderer.releases.len() + 1) { (group) } }
                             @for capability in capabilities { (row(renderer, capability)) }
@@ -40,6 +40,7 @@ pub(super) fn page(cards: &Cards, renderer: &RendererCard) -> Markup {
                     }
                 }
             }
+            (not_published(cards, ROOT))
         }
         section aria-labelledby="changes-title" {
             h2 id="changes-title" { "What changed" }
@@ -73,9 +74,8 @@ fn row(renderer: &RendererCard, capability: &Capability) -> Markup {
 fn short(standing: &Standing) -> String {
     match standing {
         Standing::Accurate { worst: Some(worst) } => worst.deviation.bound_text(),
-        Standing::Limited { worst: Some(worst), .. } | Standing::Wrong { worst: Some(worst), .. } => {
-            format!("{}, {}", standing.word(), worst.deviation.bound_text())
-        }
+        Standing::Limited { worst: Some(worst), .. } => format!("limited, {}", worst.deviation.bound_text()),
+        Standing::Wrong { worst: Some(worst), .. } => format!("off by {}", worst.deviation.bound_text()),
         other => other.headline(),
     }
 }

@@ -76,7 +76,7 @@ fn a_cell_has_a_sign_a_text_and_a_class_and_leads_to_the_evidence_of_its_release
     let index = content(&files, "index.html");
     let cell = index.split("<td ").find(|cell| cell.contains("data-renderer=\"rays\"")).unwrap();
     assert!(
-        cell.starts_with("class=\"s-wrong\"") && cell.contains("✕") && cell.contains("wrong, up to 51\u{a0}%"),
+        cell.starts_with("class=\"s-wrong\"") && cell.contains("✕") && cell.contains("wrong, off by up to 51\u{a0}%"),
         "{cell}"
     );
     assert!(cell.contains("href=\"renderers/rays/direct.html#r-2.0\"") && cell.contains("worst: a"), "{cell}");
@@ -85,6 +85,59 @@ fn a_cell_has_a_sign_a_text_and_a_class_and_leads_to_the_evidence_of_its_release
     for text in ["floor[0]", "150.000 lx", "100.000 lx", "+50.00 ± 0.10 %", "hidden, seed 7", "within 0.20 %"] {
         assert!(evidence.contains(text), "no {text}");
     }
+}
+
+#[test]
+fn pages_state_the_pass_limit_of_rows_and_of_cells() {
+    let mut reports = usual();
+    reports[2].engines[0].role = luxproof_model::Role::Reference;
+    reports[2].comparisons.iter_mut().for_each(|c| c.tolerance.relative = 0.1);
+    let files = site(&reports);
+    let index = content(&files, "index.html");
+    assert!(index.contains("pass limit 1\u{a0}%</span>"), "{index}");
+    // luxproof's own hand method has its own limit, and says so.
+    let cell = index.split("<td ").find(|cell| cell.contains("data-renderer=\"other\"")).unwrap();
+    assert!(cell.contains("judged by the accuracy that it claims: 10\u{a0}%"), "{cell}");
+    assert!(content(&files, "renderers/rays/direct.html").contains("<strong>Pass limit</strong>: 1 % (the larger"));
+    assert!(content(&files, "renderers/other/direct.html").contains("never wrong"));
+    assert!(content(&files, "capabilities.html").contains("<dt>furnace</dt>"));
+}
+
+#[test]
+fn a_capability_that_nothing_was_tested_for_has_no_row_and_is_named_below_the_table() {
+    let reports = usual();
+    let runs: Vec<(CardRun, &Report)> = reports.iter().map(|r| (CardRun::of(r, Verification::Own), r)).collect();
+    let mut all = capabilities(2);
+    let mut other = all.capabilities[0].clone();
+    (other.id, other.title) = ("bodies".to_owned().try_into().unwrap(), "Bodies".to_owned());
+    other.cases = serde_json::from_str(r#"[{"case": "far", "procedures": ["direct_illuminance"]}]"#).unwrap();
+    other.minimum_cases = 1;
+    // First in the file, so that the numbers of rows shift.
+    all.capabilities.insert(0, other);
+    let (cards, evidence) = Cards::of(&all, &runs, Tool::default()).unwrap();
+    let files = files(&cards, &evidence).unwrap();
+    for page in ["index.html", "hidden.html", "renderers/rays/index.html"] {
+        let page = content(&files, page);
+        assert_eq!(page.matches(">Bodies</a>").count(), 1, "{page}");
+        let (_, below) = page.split_once("Without a row").unwrap();
+        assert!(below.contains(">Bodies</a>"), "{below}");
+    }
+    assert_eq!(release_data(content(&files, "index.html"))["capabilities"], serde_json::json!(["direct"]));
+}
+
+#[test]
+fn a_cell_leads_to_the_json_of_its_run_and_names_the_cases_to_repeat() {
+    let reports = usual();
+    let mut run = CardRun::of(&reports[0], Verification::Own);
+    (run.report, run.bundle) = (Some("runs/1/report.html".to_owned()), Some("runs/1/bundle.zip".to_owned()));
+    run.request = Some(luxproof_model::Request::default());
+    run.bundled_specs =
+        ["a", "b", "hidden-7-a"].iter().map(|case| (format!("{case}.yaml"), format!("specs/{case}.yaml"))).collect();
+    let (cards, evidence) = Cards::of(&capabilities(2), &[(run, &reports[0])], Tool::default()).unwrap();
+    let files = files(&cards, &evidence).unwrap();
+    let page = content(&files, "renderers/rays/direct.html");
+    assert!(page.contains("href=\"../../runs/1/report.json\""), "{page}");
+    assert!(page.contains("--filter a --filter hidden-7-a --filter b"), "{page}");
 }
 
 /// The data from which the first page unfolds older releases.
