@@ -132,6 +132,11 @@ pub struct CardRun {
     pub report: Option<String>,
     /// Its bundle on the site, likewise.
     pub bundle: Option<String>,
+    /// Sizes of its `report.json` and of its bundle on the site, in bytes; null where unknown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub report_bytes: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bundle_bytes: Option<u64>,
     /// The place of each spec in the bundle, by the path that the run was given.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub bundled_specs: BTreeMap<String, String>,
@@ -192,6 +197,8 @@ impl CardRun {
             request: report.request.clone(),
             report: None,
             bundle: None,
+            report_bytes: None,
+            bundle_bytes: None,
             bundled_specs: BTreeMap::new(),
             verification,
         }

@@ -9,7 +9,7 @@ use luxproof_model::{FailureKind, ProcedureId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Capability, CaseEvidence, Deviation, Measurement, Outcome, PassLimit, Remark};
+use crate::{Capability, CaseEvidence, Deviation, Measurement, Outcome, Remark, StatedTolerance};
 
 /// Cases that a text lists by name.
 const LISTED_CASES: usize = 3;
@@ -30,7 +30,7 @@ pub struct Cell {
     pub missing: Vec<String>,
     /// How far its points may be from their references, each limit once, the narrowest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub limits: Vec<PassLimit>,
+    pub tolerances: Vec<StatedTolerance>,
     /// Public against hidden cases; null without hidden ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread: Option<Spread>,
@@ -271,8 +271,8 @@ pub fn judge(capability: &Capability, evidence: &[CaseEvidence]) -> Cell {
         hidden_variants: hidden.iter().filter(|e| e.measurement().is_some()).count(),
         points: evidence.iter().filter_map(CaseEvidence::measurement).map(|m| m.verdicts.all).sum(),
         missing,
-        limits: PassLimit::all_of(
-            evidence.iter().filter_map(CaseEvidence::measurement).flat_map(|m| m.limits.iter().cloned()),
+        tolerances: StatedTolerance::all_of(
+            evidence.iter().filter_map(CaseEvidence::measurement).flat_map(|m| m.tolerances.iter().cloned()),
         ),
         spread,
     }
@@ -741,11 +741,11 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_has_the_pass_limits_of_its_points() {
+    fn a_cell_has_the_stated_tolerances_of_its_points() {
         let mut report = report(ENGINE, "1.0", &three(MadeCase::new("a").off(0.0, 0.0)));
         report.comparisons[1].tolerance = luxproof_model::Tolerance { relative: 0.1, absolute: 0.001 };
         let found = cell_of(&report, 3);
-        let texts: Vec<String> = found.limits.iter().map(ToString::to_string).collect();
+        let texts: Vec<String> = found.tolerances.iter().map(ToString::to_string).collect();
         assert_eq!(texts, ["1 %", "10 % or 0.001 lx"]);
     }
 
@@ -870,7 +870,7 @@ mod tests {
     }
 
     #[test]
-    fn a_known_limit_covers_its_own_case_and_no_hidden_variant() {
+    fn a_known_tolerance_covers_its_own_case_and_no_hidden_variant() {
         let mut report = known("limit");
         let with_variant =
             super::super::fixtures::report(ENGINE, "1.0", &[MadeCase::new("a").hidden(7).off(-0.15, 0.001)]);

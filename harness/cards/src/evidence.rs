@@ -11,7 +11,7 @@ use luxproof_model::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Capabilities, Capability, CapabilityId, Deviation, PassLimit, RunId};
+use crate::{Capabilities, Capability, CapabilityId, Deviation, RunId, StatedTolerance};
 
 /// The name of the scenes of known answer in capabilities.
 const CALIBRATION: &str = "calibration";
@@ -76,7 +76,7 @@ pub struct Measurement {
     pub remarks: Vec<Remark>,
     /// How far its points may be from their references, each limit once.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub limits: Vec<PassLimit>,
+    pub tolerances: Vec<StatedTolerance>,
     /// The points with the largest bounds, at most eight.
     pub points: Vec<PointEvidence>,
 }
@@ -264,7 +264,7 @@ impl<'a> ReportIndex<'a> {
             verdicts: VerdictCounts::of(judged),
             worst: points.first().map(|point| point.deviation),
             remarks,
-            limits: PassLimit::all_of(judged.iter().map(|c| PassLimit::of(c))),
+            tolerances: StatedTolerance::all_of(judged.iter().map(|c| StatedTolerance::of(c))),
             points: points.into_iter().take(LISTED_POINTS).collect(),
         }
     }

@@ -10,11 +10,11 @@ mod cell;
 mod deviation;
 mod error;
 mod evidence;
-mod pass_limit;
 mod release_label;
 pub mod site;
 mod site_folder;
 mod slug;
+mod stated_tolerance;
 
 #[cfg(test)]
 mod fixtures;
@@ -29,7 +29,7 @@ pub use cell::{Cell, Place, Spread, Standing, WorstPoint, judge};
 pub use deviation::{Deviation, Measure};
 pub use error::CardsError;
 pub use evidence::{CaseEvidence, Measurement, Outcome, PointEvidence, Remark, VerdictCounts};
-pub use pass_limit::PassLimit;
 pub use release_label::ReleaseLabel;
 pub use site_folder::{SITE_FILE, SiteFolder, SiteFolderError};
 pub use slug::slug;
+pub use stated_tolerance::StatedTolerance;

@@ -20,7 +20,7 @@ pub(super) fn page(cards: &Cards) -> Markup {
         section aria-labelledby="rule-title" {
             h2 id="rule-title" { "The rule" }
             ol.rule {
-                li { "A point passes if its deviation with its expanded uncertainty stays within the " strong { "pass limit" } ". The first page states it for each capability, and the page of each cell for its cases." }
+                li { "A point passes if its deviation with its expanded uncertainty stays within the " strong { "tolerance" } ". The first page states it for each capability, and the page of each cell for its cases." }
                 li { "One wrong point in one case makes the cell " strong { "wrong" } ". No mean hides it. The cell says by how much it is off." }
                 li { "A run that its time limit cut short decides nothing: values that would be wrong count as " strong { "no answer in time" } "." }
                 li { "A renderer that declines cases and has no values is " strong { "not supported" } ". If it has values too, the cell is " strong { "limited" } "." }
@@ -65,7 +65,7 @@ const WORDS: [(&str, &str); 12] = [
     ),
     ("hidden variant", "the same case with another room, other positions and another table, drawn from a seed."),
     (
-        "pass limit",
+        "tolerance",
         "the largest deviation from the right value with which a point passes: a part of that value, or a fixed amount near zero.",
     ),
     ("expanded uncertainty", "twice the standard uncertainty. The right value lies within it in about 95 % of cases."),

@@ -2,7 +2,7 @@
 
 use itertools::Itertools;
 use luxproof_model::REPORT_FILE;
-use luxproof_model::numbers::{plural, significant};
+use luxproof_model::numbers::{plural, significant, trimmed};
 use luxproof_report::{minus, table};
 use maud::{Markup, html};
 
@@ -68,7 +68,7 @@ fn release_section(cards: &Cards, renderer: &str, release: &ReleaseEvidence, is_
                 (plural(release.cell.hidden_variants, "hidden variant")) ", " (plural(release.cell.points, "comparison"))
                 @if !release.cell.missing.is_empty() { "; in no run: " (release.cell.missing.join(", ")) }
             }
-            (limit_line(cards, renderer, release))
+            (tolerance_line(cards, renderer, release))
             @if let Some(spread) = &release.cell.spread { (spread_line(spread, release.cell.worst_without_variant())) }
             @let notes = release.cases.iter().flat_map(|case| &case.notes).unique().take(LISTED_NOTES).collect_vec();
             @if !notes.is_empty() { ul.changes aria-label={ "Notes on " (release.release) } { @for note in notes { li { (note) } } } }
@@ -90,13 +90,13 @@ fn release_section(cards: &Cards, renderer: &str, release: &ReleaseEvidence, is_
 }
 
 /// How far points may be from their references.
-fn limit_line(cards: &Cards, renderer: &str, release: &ReleaseEvidence) -> Markup {
-    let limits = release.cell.limits.iter().map(ToString::to_string).join("; ");
+fn tolerance_line(cards: &Cards, renderer: &str, release: &ReleaseEvidence) -> Markup {
+    let tolerances = release.cell.tolerances.iter().map(ToString::to_string).join("; ");
     let is_own = cards.renderers.iter().any(|card| card.name == renderer && card.is_own);
     html! {
-        @if !limits.is_empty() {
+        @if !tolerances.is_empty() {
             p.where {
-                strong { "Pass limit" } ": " (limits) " (the larger of both). A point passes if its deviation with its expanded uncertainty stays within it."
+                strong { "Tolerance" } ": " (tolerances) " (the larger of both). A point passes if its deviation with its expanded uncertainty stays within it."
                 @if is_own { " luxproof's own hand methods are judged by the accuracy that they claim, in public cases and in hidden variants. Beyond it a point is not judged: the cell is limited, never wrong." }
             }
         }
@@ -154,7 +154,7 @@ fn outcome_cells(case: &CaseEvidence) -> Markup {
                 td.number { @if let Some(worst) = &measurement.worst { (worst) } @else { "–" } }
                 td { (result(measurement)) }
             }
-            Outcome::Unsupported { reason } => { td.number { "0" } td.number { "–" } td { "declined: " (reason) } }
+            Outcome::Unsupported { reason } => { td.number { "0" } td.number { "–" } td { "not supported: " (reason) } }
             Outcome::NotRun { reason } => { td.number { "0" } td.number { "–" } td { "not run: " (reason) } }
             Outcome::Failed { reason, .. } => { td.number { "0" } td.number { "–" } td.bad { "failed: " (reason) } }
         }
@@ -243,10 +243,10 @@ fn run_entry(run: &CardRun, release: &ReleaseEvidence) -> Markup {
             }
             @if let Some(report) = &run.report {
                 a href={ (ROOT) (report) } { "Full report with every point and plan" } ", "
-                a href={ (ROOT) (folder(report)) (REPORT_FILE) } { "the same as " code { (REPORT_FILE) } } ". "
+                a href={ (ROOT) (folder(report)) (REPORT_FILE) } { "the same as " code { (REPORT_FILE) } } (size(run.report_bytes)) ". "
             }
             @if let Some(bundle) = &run.bundle {
-                a href={ (ROOT) (bundle) } { "Bundle" } " with all inputs; "
+                a href={ (ROOT) (bundle) } { "Bundle" } (size(run.bundle_bytes)) " with all inputs; "
                 code { "luxproof reproduce " (file_name(bundle)) } " repeats the whole run and compares every value."
             } @else {
                 "It has no bundle on this site."
@@ -257,6 +257,12 @@ fn run_entry(run: &CardRun, release: &ReleaseEvidence) -> Markup {
             pre.commands tabindex="0" { code { "unzip -q " (run.bundle.as_deref().map_or("bundle.zip", file_name)) " -d bundle && cd bundle\n" (command) } }
         }
     }
+}
+
+/// The size of a file in parentheses.
+fn size(bytes: Option<u64>) -> String {
+    // Of a million bytes each; a small file counts as a tenth.
+    bytes.map(|bytes| format!(" ({} MB)", trimmed((bytes as f64 / 1e6).max(0.1), 1))).unwrap_or_default()
 }
 
 /// A path on the site up to its last part.

@@ -7,8 +7,8 @@ use maud::{Markup, PreEscaped, html};
 use super::releases::release_data;
 use super::{STATES, frame, hidden_page, legend, not_published, published, shortened, sign};
 use crate::cards::anchor;
-use crate::pass_limit::summary;
-use crate::{Capability, Cards, CardsError, CellCard, PassLimit, RendererCard, Since, Standing};
+use crate::stated_tolerance::summary;
+use crate::{Capability, Cards, CardsError, CellCard, RendererCard, Since, Standing, StatedTolerance};
 
 const SCRIPT: &str = include_str!("index.js");
 /// Letters of a fault that the matrix shows.
@@ -31,7 +31,7 @@ pub(super) fn page(cards: &Cards) -> Result<Markup, CardsError> {
                 "independent calculation that states its own error. The worst point of the worst case counts. Each cell leads to its evidence."
             }
             p.lead {
-                "Each row has its " strong { "pass limit" } ": a point passes if its error, with its expanded uncertainty (about 95 %), "
+                "Each row has its " strong { "tolerance" } ": a point passes if its error, with its expanded uncertainty (about 95 %), "
                 "stays within that part of the right value. "
                 a href="capabilities.html#rule-title" { "The rule" } " and " a href="capabilities.html#words-title" { "the words" } "."
             }
@@ -111,16 +111,16 @@ fn column_head(renderer: &RendererCard) -> Markup {
 
 fn row(cards: &Cards, capability: &Capability) -> Markup {
     let text = format!("{} {} {}", capability.group, capability.title, capability.question).to_lowercase();
-    let limit = row_limit(cards, capability);
+    let tolerance = row_tolerance(cards, capability);
     html! {
         tr data-text=(text) {
             th scope="row" {
                 a href={ "capabilities.html#" (capability.id) } { (capability.title) }
-                @if let Some(limit) = &limit { span.since { "pass limit " (limit.replace(" %", "\u{a0}%")) } }
+                @if let Some(tolerance) = &tolerance { span.since { "tolerance " (tolerance.replace(" %", "\u{a0}%")) } }
             }
             @for renderer in &cards.renderers {
                 @match renderer.releases.first().and_then(|release| release.cell(&capability.id)) {
-                    Some(cell) => (matrix_cell(renderer, cell, limit.as_deref())),
+                    Some(cell) => (matrix_cell(renderer, cell, tolerance.as_deref())),
                     None => td {},
                 }
             }
@@ -128,18 +128,19 @@ fn row(cards: &Cards, capability: &Capability) -> Markup {
     }
 }
 
-/// The pass limit of a capability: that of the renderers, or that of luxproof's own solvers where no renderer has values.
-fn row_limit(cards: &Cards, capability: &Capability) -> Option<String> {
+/// The tolerance of a capability: that of the renderers, or that of luxproof's own solvers where no renderer has values.
+fn row_tolerance(cards: &Cards, capability: &Capability) -> Option<String> {
     [false, true].into_iter().find_map(|is_own| {
         let releases = cards.renderers.iter().filter(|of| of.is_own == is_own).flat_map(|of| &of.releases);
         let cells = releases.filter_map(|release| release.cell(&capability.id));
-        summary(&PassLimit::all_of(cells.flat_map(|cell| cell.cell.limits.iter().cloned())))
+        summary(&StatedTolerance::all_of(cells.flat_map(|cell| cell.cell.tolerances.iter().cloned())))
     })
 }
 
-fn matrix_cell(renderer: &RendererCard, cell: &CellCard, row_limit: Option<&str>) -> Markup {
+fn matrix_cell(renderer: &RendererCard, cell: &CellCard, row_tolerance: Option<&str>) -> Markup {
     let standing = &cell.cell.standing;
-    let own_limit = summary(&cell.cell.limits).filter(|limit| renderer.is_own && Some(limit.as_str()) != row_limit);
+    let own_tolerance =
+        summary(&cell.cell.tolerances).filter(|tolerance| renderer.is_own && Some(tolerance.as_str()) != row_tolerance);
     html! {
         td class={ "s-" (standing.key()) } data-renderer=(renderer.name) {
             a.cell href=(cell.page) {
@@ -149,7 +150,7 @@ fn matrix_cell(renderer: &RendererCard, cell: &CellCard, row_limit: Option<&str>
                     Standing::Failed { reason, .. } | Standing::NotSupported { reason } => span.why { (shortened(reason, SHOWN_LETTERS)) },
                     Standing::Accurate { .. } | Standing::NotTested { .. } => {},
                 }
-                @if let Some(limit) = own_limit { span.why { "a hand method, judged by the accuracy that it claims: " (limit.replace(" %", "\u{a0}%")) } }
+                @if let Some(tolerance) = own_tolerance { span.why { "a hand method, judged by the accuracy that it claims: " (tolerance.replace(" %", "\u{a0}%")) } }
                 @if let Some(place) = standing.place() { span.since { "worst: " (shortened(&place.case_text(), CASE_LETTERS)) } }
                 @if let Some(since) = renderer.since(&cell.capability) { (since_line(since)) }
             }

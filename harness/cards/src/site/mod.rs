@@ -19,7 +19,7 @@ use itertools::Itertools;
 use luxproof_report::{BASE_STYLE, minus};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::{Capability, CapabilityId, Cards, CardsError, CellEvidence, Standing};
+use crate::{Capability, CapabilityId, Cards, CardsError, CellCard, CellEvidence, ReleaseCard, Standing};
 
 /// The file with every cell, in the root of the site.
 pub const CARDS_FILE: &str = "cards.json";
@@ -115,11 +115,19 @@ fn frame(
 
 /// The capabilities that some release was tested for, in their order: a row without any says nothing about a renderer.
 fn published(cards: &Cards) -> Vec<&Capability> {
-    let releases = cards.renderers.iter().flat_map(|renderer| &renderer.releases);
-    let cells = releases.flat_map(|release| &release.cells);
-    let tested: HashSet<&CapabilityId> =
-        cells.filter(|cell| !cell.cell.standing.is_untested()).map(|cell| &cell.capability).collect();
-    cards.capabilities.capabilities.iter().filter(|capability| tested.contains(&capability.id)).collect()
+    let releases = cards.renderers.iter().flat_map(|renderer| &renderer.releases).collect_vec();
+    let capabilities = cards.capabilities.capabilities.iter();
+    capabilities.filter(|capability| releases.iter().any(|release| is_tested(release, capability))).collect()
+}
+
+/// Whether a release was tested for a capability. One that declines what is there was, where enough cases are there.
+fn is_tested(release: &ReleaseCard, capability: &Capability) -> bool {
+    let Some(CellCard { cell, .. }) = release.cell(&capability.id) else { return false };
+    match cell.standing {
+        Standing::NotTested { .. } => false,
+        Standing::NotSupported { .. } => cell.all_cases.saturating_sub(cell.missing.len()) >= capability.minimum_cases,
+        _ => true,
+    }
 }
 
 /// The capabilities without a row, as a paragraph below a table.
@@ -152,14 +160,14 @@ const STATES: [(&str, &str, &str, &str); 6] = [
         "accurate",
         "✓",
         "within x %",
-        "every point of every case is within its pass limit; no error is larger than x, uncertainty included",
+        "every point of every case is within its tolerance; no error is larger than x, uncertainty included",
     ),
     ("limited", "≈", "limited", "right within limits that are known, or not decided yet"),
     (
         "wrong",
         "✕",
         "wrong",
-        "at least one value is beyond its pass limit; x is the largest error; the page names the fault",
+        "at least one value is beyond its tolerance; the cell says by how much, its page names the fault",
     ),
     ("failed", "!", "fails", "it crashes, gives no answer in time or an unreadable one"),
     ("unsupported", "–", "not supported", "it has no values: the renderer declines the cases and says why"),

@@ -88,17 +88,17 @@ fn a_cell_has_a_sign_a_text_and_a_class_and_leads_to_the_evidence_of_its_release
 }
 
 #[test]
-fn pages_state_the_pass_limit_of_rows_and_of_cells() {
+fn pages_state_the_stated_tolerance_of_rows_and_of_cells() {
     let mut reports = usual();
     reports[2].engines[0].role = luxproof_model::Role::Reference;
     reports[2].comparisons.iter_mut().for_each(|c| c.tolerance.relative = 0.1);
     let files = site(&reports);
     let index = content(&files, "index.html");
-    assert!(index.contains("pass limit 1\u{a0}%</span>"), "{index}");
+    assert!(index.contains("tolerance 1\u{a0}%</span>"), "{index}");
     // luxproof's own hand method has its own limit, and says so.
     let cell = index.split("<td ").find(|cell| cell.contains("data-renderer=\"other\"")).unwrap();
     assert!(cell.contains("judged by the accuracy that it claims: 10\u{a0}%"), "{cell}");
-    assert!(content(&files, "renderers/rays/direct.html").contains("<strong>Pass limit</strong>: 1 % (the larger"));
+    assert!(content(&files, "renderers/rays/direct.html").contains("<strong>Tolerance</strong>: 1 % (the larger"));
     assert!(content(&files, "renderers/other/direct.html").contains("never wrong"));
     assert!(content(&files, "capabilities.html").contains("<dt>furnace</dt>"));
 }
@@ -130,6 +130,7 @@ fn a_cell_leads_to_the_json_of_its_run_and_names_the_cases_to_repeat() {
     let reports = usual();
     let mut run = CardRun::of(&reports[0], Verification::Own);
     (run.report, run.bundle) = (Some("runs/1/report.html".to_owned()), Some("runs/1/bundle.zip".to_owned()));
+    (run.report_bytes, run.bundle_bytes) = (Some(3_456_000), Some(999));
     run.request = Some(luxproof_model::Request::default());
     run.bundled_specs =
         ["a", "b", "hidden-7-a"].iter().map(|case| (format!("{case}.yaml"), format!("specs/{case}.yaml"))).collect();
@@ -137,7 +138,19 @@ fn a_cell_leads_to_the_json_of_its_run_and_names_the_cases_to_repeat() {
     let files = files(&cards, &evidence).unwrap();
     let page = content(&files, "renderers/rays/direct.html");
     assert!(page.contains("href=\"../../runs/1/report.json\""), "{page}");
+    assert!(page.contains("report.json</code></a> (3.5 MB)") && page.contains("Bundle</a> (0.1 MB)"), "{page}");
     assert!(page.contains("--filter a --filter hidden-7-a --filter b"), "{page}");
+}
+
+#[test]
+fn declined_cases_make_a_row_where_the_publication_has_enough_of_them() {
+    let given = [MadeCase::new("a").unsupported(), MadeCase::new("b").unsupported()];
+    let all = site(&[report("web", "1", &given)]);
+    assert!(content(&all, "index.html").contains("<td class=\"s-unsupported\""));
+    // One case of at least two says nothing about the row.
+    let one = site(&[report("web", "1", &given[..1])]);
+    let (table, below) = content(&one, "index.html").split_once("Without a row").unwrap();
+    assert!(!table.contains("td class=\"s-unsupported\"") && below.contains("Direct light"), "{below}");
 }
 
 /// The data from which the first page unfolds older releases.

@@ -185,9 +185,11 @@ fn write_site(
     for source in &mut sources {
         let folder = format!("{RUNS}/{}", source.run.id.as_str());
         source.run.report = Some(format!("{folder}/{}", luxproof_report::PAGE));
+        source.run.report_bytes = fs::metadata(&source.file).ok().map(|metadata| metadata.len());
         let zip = stage.path().join(format!("{}.zip", source.run.id.as_str()));
         if let Some(specs) = pack(source, &zip, trust)? {
             source.run.bundle = Some(format!("{folder}/{BUNDLE}"));
+            source.run.bundle_bytes = fs::metadata(&zip).ok().map(|metadata| metadata.len());
             source.run.bundled_specs = specs;
             packed.insert(source.run.id.clone(), zip);
         }
