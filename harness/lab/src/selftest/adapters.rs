@@ -344,7 +344,7 @@ fn draw_readout(random: &mut fastrand::Rng) -> AdapterFault {
 }
 
 /// Right light with a change of each value that is read.
-fn by_readout(read: Box<dyn Fn(f64) -> f64>) -> AdapterReader {
+pub(super) fn by_readout(read: Box<dyn Fn(f64) -> f64>) -> AdapterReader {
     Box::new(move |model| {
         let targets = model.task.targets.iter().zip(&model.right);
         targets.map(|(t, right)| t.aspects[0].weight * read(right / t.aspects[0].weight)).collect()

@@ -12,7 +12,7 @@ use luxproof_scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport
 use serde::Serialize;
 
 use super::SelftestError;
-use super::adapters::{AdapterFault, GROUPS};
+use super::adapters::{self, AdapterFault, GROUPS};
 use luxproof_model::{
     Comparison, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Uncertainty, Verdict,
 };
@@ -98,8 +98,8 @@ const KINDS: [(&str, bool, FaultSampler); 17] = [
     ("two listed", true, draw_two_faults),
     ("control: lux to the power of 1.05", false, |_, _| Some(control(|m| scaled_power(&m.right, 1.05)))),
     ("squared lux", true, |_, _| {
-        let squared = control(|m| m.right.iter().map(|r| r * r).collect());
-        Some(InjectedFault { words: &["raised to the power"], ..squared })
+        let reader = adapters::by_readout(Box::new(|lux| lux * lux));
+        Some(InjectedFault { parts: vec![], words: &["raised to the power"], reader })
     }),
     ("control: three surfaces at once", false, |_, random| {
         let reflectances = [0; 3].map(|_| random.f64());
