@@ -133,6 +133,49 @@ fn profiles_multiply_and_flat_lights_add_their_cosine() {
     assert_eq!(candela(&flat, 0.0, 120.0), 0.0);
 }
 
+/// Without softness a light is full up to the angle of its cone and dark beyond. `ShapingAPI` has a default of 90 degrees.
+#[test]
+fn cones_cut_tables_off_and_have_the_default_of_their_schema() {
+    let isotropic = only(
+        r#"def SphereLight "P" { float inputs:intensity = 40
+        bool inputs:normalize = 1
+        bool treatAsPoint = 1
+        float inputs:shaping:cone:angle = 30.5 }"#,
+    );
+    for (gamma, expected) in [(0.0, 10.0), (30.4, 10.0), (30.6, 0.0), (120.0, 0.0)] {
+        assert_eq!(candela(&isotropic, 45.0, gamma), expected, "{gamma}");
+    }
+    let profile = |metadata: &str, angle: &str| {
+        only(&format!(
+            r#"def SphereLight "P" {metadata} {{ float inputs:intensity = 4
+            bool inputs:normalize = 1
+            bool treatAsPoint = 1
+            {angle}
+            asset inputs:shaping:ies:file = @a.ies@ }}"#
+        ))
+    };
+    let applied = r#"(prepend apiSchemas = ["ShapingAPI"])"#;
+    // The table falls from 200 at 60 degrees to 100 at 180.
+    for (light, upwards) in [
+        (profile(applied, ""), 0.0),
+        (profile(applied, "float inputs:shaping:cone:angle = 180"), 100.0),
+        (profile("", ""), 100.0),
+    ] {
+        assert_near(candela(&light, 0.0, 90.0), 175.0, 1e-12);
+        assert_eq!(candela(&light, 0.0, 180.0), upwards);
+        assert_eq!(light.0.flux_scale, 1.0);
+    }
+    assert_eq!(candela(&profile(applied, ""), 0.0, 90.001), 0.0);
+    // A flat light within a cone: the cosine, and nothing beyond.
+    let flat = only(
+        r#"def RectLight "R" { float inputs:intensity = 100
+        bool inputs:normalize = 1
+        float inputs:shaping:cone:angle = 40 }"#,
+    );
+    assert_near(candela(&flat, 0.0, 39.9), 100.0 * f64::cos(f64::to_radians(39.9)), 2e-4);
+    assert_eq!(candela(&flat, 0.0, 40.1), 0.0);
+}
+
 /// `OpenUSD`'s colours have the primaries of ITU-R BT.709, its blackbody colours a luminance of 1 by these weights.
 #[test]
 fn colours_of_lights_count_by_their_luminance_and_odd_inputs_are_noted() {
@@ -184,7 +227,8 @@ fn what_no_photometric_file_says_is_left_out_and_named() {
     let (luminaires, left_out) = lights(
         r#"def DistantLight "a" {}
         def DomeLight "b" {}
-        def SphereLight "c" { float inputs:shaping:cone:angle = 30 }
+        def SphereLight "c" { float inputs:shaping:cone:angle = 30
+            float inputs:shaping:cone:softness = 0.1 }
         def SphereLight "d" { float inputs:shaping:focus = 5 }
         def SphereLight "e" { float inputs:intensity = 0 }
         def RectLight "f" { asset inputs:texture:file = @t.png@ }
@@ -204,7 +248,7 @@ fn what_no_photometric_file_says_is_left_out_and_named() {
     for what in [
         "1 distant lights",
         "1 dome lights",
-        "1 lights with a cone",
+        "1 lights with a soft cone",
         "1 lights with a focus",
         "1 lights without light",
         "1 lights with a texture",

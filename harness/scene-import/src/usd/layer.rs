@@ -79,6 +79,8 @@ pub(super) struct Prim {
     pub(super) parent: Option<usize>,
     /// Whether it is defined, active, and no template of others.
     pub(super) is_there: bool,
+    /// Whether `ShapingAPI` is applied to it: then its inputs have their defaults.
+    pub(super) is_shaped: bool,
     properties: BTreeMap<String, Value>,
 }
 
@@ -154,6 +156,7 @@ struct Parser<'a> {
 #[derive(Default)]
 struct Metadata {
     is_inactive: bool,
+    is_shaped: bool,
     meters_per_unit: Option<f64>,
     up_axis: Option<String>,
 }
@@ -204,13 +207,13 @@ impl<'a> Parser<'a> {
             let message = format!("more than {MAX_PRIMS} prims, or {MAX_DEPTH} below one another");
             return Err(self.fault(&message, "import a part of the scene"));
         }
-        let is_inactive = if self.words.takes('(')? { self.metadata()?.is_inactive } else { false };
+        let metadata = if self.words.takes('(')? { self.metadata()? } else { Metadata::default() };
         self.words.expect('{')?;
         let parent = self.open.last().copied();
         let place = self.layer.prims.len();
         self.layer.by_name.insert((parent, name.clone()), place);
-        let is_there = is_defined && !is_inactive;
-        self.layer.prims.push(Prim { name, kind, line, parent, is_there, properties: BTreeMap::new() });
+        let (is_there, is_shaped) = (is_defined && !metadata.is_inactive, metadata.is_shaped);
+        self.layer.prims.push(Prim { name, kind, line, parent, is_there, is_shaped, properties: BTreeMap::new() });
         self.open.push(place);
         Ok(())
     }
@@ -223,10 +226,13 @@ impl<'a> Parser<'a> {
                 Token::Sign(')') => return Ok(found),
                 Token::Word(name) if ARCS.contains(&name) => return Err(self.composed(name)),
                 Token::Word(name) if self.words.takes('=')? => {
-                    let value = self.value(matches!(name, "active" | "metersPerUnit" | "upAxis"))?;
+                    let value = self.value(matches!(name, "active" | "apiSchemas" | "metersPerUnit" | "upAxis"))?;
                     match (name, value) {
                         ("active", Some(Value::Texts(texts))) => found.is_inactive = texts == ["false"],
                         ("active", Some(Value::Numbers(numbers))) => found.is_inactive = numbers == [0.0],
+                        ("apiSchemas", Some(Value::Texts(texts))) => {
+                            found.is_shaped = texts.iter().any(|schema| schema == "ShapingAPI");
+                        }
                         ("metersPerUnit", Some(Value::Numbers(numbers))) => {
                             found.meters_per_unit = numbers.first().copied();
                         }

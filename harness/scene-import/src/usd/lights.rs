@@ -23,6 +23,9 @@ const C_STEP_DEG: f64 = 2.0;
 /// How far lengths along the axes may differ in a light that is round, relative.
 const SAME_LENGTH: f64 = 1e-6;
 
+/// The default of `shaping:cone:angle`, which hides all light upwards where a layer says nothing.
+const DEFAULT_CONE_DEG: f64 = 90.0;
+
 /// What else has the ending of a light, and is none that a spec has.
 const OTHER_LIGHTS: [(&str, &str); 9] = [
     ("DistantLight", "distant lights"),
@@ -90,8 +93,8 @@ impl Shape {
         }
     }
 
-    /// Those steps with the nodes of a table, between its ends: beyond them it is dark at once.
-    fn nodes_with(self, table: &LuminousIntensityDistribution) -> (Vec<f64>, Vec<f64>) {
+    /// Those steps with the nodes of a table, between its ends and within a cone: beyond them it is dark at once.
+    fn nodes_with(self, table: &LuminousIntensityDistribution, cone_deg: f64) -> (Vec<f64>, Vec<f64>) {
         let (c_deg, gamma_deg) = self.steps_deg();
         // A shape that looks the same from every plane leaves those of the table as they are.
         let all_c = if c_deg.len() == 1 { table.c_deg().to_vec() } else { joined(&c_deg, table.full_circle().c_deg()) };
@@ -99,7 +102,7 @@ impl Shape {
         if let [first, .., last] = *table.gamma_deg() {
             all_gamma.retain(|gamma| (first..=last).contains(gamma));
         }
-        (all_c, all_gamma)
+        (all_c, within(all_gamma, cone_deg))
     }
 
     fn opening(self) -> LuminousOpening {
@@ -214,11 +217,14 @@ impl Reader<'_, '_> {
         candela: f64,
         opening: LuminousOpening,
     ) -> Result<Option<(Profile, f64)>, SpecError> {
+        let cone_deg = cone_deg(prim);
         let Some(name) = profile_name(prim) else {
-            if opening == LuminousOpening::Point {
+            if opening == LuminousOpening::Point && cone_deg >= 180.0 {
                 return Ok(Some((Profile::Isotropic(candela), 1.0)));
             }
-            return Ok(self.drawn(prim, |c, gamma| candela * shape.seen_share(c, gamma), shape.steps_deg(), opening));
+            let (c_deg, gamma_deg) = shape.steps_deg();
+            let nodes = (c_deg, within(gamma_deg, cone_deg));
+            return Ok(self.drawn(prim, |c, gamma| candela * shape.seen_share(c, gamma), nodes, opening));
         };
         let path = self.raw.scene.path_of(name);
         let read = self.raw.scene.read(&path);
@@ -231,16 +237,20 @@ impl Reader<'_, '_> {
                 self.raw
                     .note("the extent of sphere lights with a profile is the one that their photometric files state");
             }
-            return Ok(Some((Profile::File(bytes), candela)));
+            if cone_deg >= 180.0 {
+                return Ok(Some((Profile::File(bytes), candela)));
+            }
         }
         let Ok(photometry) = lm63::parse(&bytes) else {
             self.raw.leave_out_light("lights with a profile that is no LM-63 file", Some(prim.line));
             return Ok(None);
         };
-        self.raw.note(
-            "profiles of flat lights and cylinders are multiplied by the area that is seen from each direction (of flat \
-             lights the cosine of gamma), as UsdLux says: the photometric files here have the product",
-        );
+        if !matches!(shape, Shape::Sphere { .. }) {
+            self.raw.note(
+                "profiles of flat lights and cylinders are multiplied by the area that is seen from each direction (of \
+                 flat lights the cosine of gamma), as UsdLux says: the photometric files here have the product",
+            );
+        }
         let in_type_c = photometry.distribution.in_type_c();
         if in_type_c.largest_error_cd > 0.0 {
             self.raw.note(format!(
@@ -251,8 +261,10 @@ impl Reader<'_, '_> {
             ));
         }
         let table = in_type_c.distribution;
-        let nodes = shape.nodes_with(&table);
+        let nodes = shape.nodes_with(&table, cone_deg);
         let intensity = |c: f64, gamma: f64| shape.seen_share(c, gamma) * table.intensity(c, gamma).value();
+        // The opening of a sphere is the one that its file states.
+        let opening = if matches!(shape, Shape::Sphere { .. }) { photometry.opening } else { opening };
         Ok(self.drawn(prim, intensity, nodes, opening).map(|(profile, _)| (profile, candela)))
     }
 
@@ -295,6 +307,22 @@ fn candela_per_profile(prim: &Prim, shape: Shape, primaries: Primaries) -> f64 {
     nits * primaries.luminous(colour) * input(prim, "diffuse").unwrap_or(1.0) * shape.projected_share() * area_m2
 }
 
+/// The angle from its axis beyond which a light is dark. `ShapingAPI` has a default.
+fn cone_deg(prim: &Prim) -> f64 {
+    let default_deg = if prim.is_shaped { DEFAULT_CONE_DEG } else { 180.0 };
+    input(prim, "shaping:cone:angle").unwrap_or(default_deg)
+}
+
+/// Angles up to the end of a cone, which is one of them where the angles go on beyond.
+fn within(mut gamma_deg: Vec<f64>, cone_deg: f64) -> Vec<f64> {
+    let count = gamma_deg.len();
+    gamma_deg.retain(|gamma| *gamma <= cone_deg);
+    if gamma_deg.len() < count && gamma_deg.last().is_some_and(|last| *last < cone_deg) {
+        gamma_deg.push(cone_deg);
+    }
+    gamma_deg
+}
+
 /// What of a light a photometric file cannot say.
 fn untaken(prim: &Prim, shape: Shape) -> Option<&'static str> {
     // Flat lights shine to one side anyway.
@@ -306,8 +334,8 @@ fn untaken(prim: &Prim, shape: Shape) -> Option<&'static str> {
         ),
         (is_input(prim, "shaping:ies:normalize"), "lights with normalised profiles (shaping:ies:normalize)"),
         (
-            input(prim, "shaping:cone:angle").is_some_and(|angle| angle < widest_deg),
-            "lights with a cone (shaping:cone:angle)",
+            cone_deg(prim) < widest_deg && input(prim, "shaping:cone:softness").is_some_and(|softness| softness != 0.0),
+            "lights with a soft cone (shaping:cone:softness)",
         ),
         (input(prim, "shaping:focus").is_some_and(|focus| focus != 0.0), "lights with a focus (shaping:focus)"),
         (text_input(prim, "texture:file").is_some_and(|file| !file.is_empty()), "lights with a texture (texture:file)"),
