@@ -59,6 +59,12 @@ pub(crate) fn summary(tolerances: &[StatedTolerance]) -> Option<String> {
     Some(range(relative, "%"))
 }
 
+/// The widest relative part, and the widest absolute one without any.
+pub(crate) fn widest(tolerances: &[StatedTolerance]) -> f64 {
+    let relative = tolerances.iter().map(|tolerance| tolerance.relative).fold(0.0, f64::max);
+    if relative > 0.0 { relative } else { tolerances.iter().map(|tolerance| tolerance.absolute).fold(0.0, f64::max) }
+}
+
 fn range(tolerances: impl IntoIterator<Item = f64>, unit: &str) -> String {
     let (low, high) = tolerances.into_iter().fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
     let [from, to] = [low, high].map(|tolerance| trimmed(tolerance, DECIMALS));

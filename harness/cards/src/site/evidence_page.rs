@@ -97,7 +97,7 @@ fn tolerance_line(cards: &Cards, renderer: &str, release: &ReleaseEvidence) -> M
         @if !tolerances.is_empty() {
             p.where {
                 strong { "Tolerance" } ": " (tolerances) " (the larger of both). A point passes if its deviation with its expanded uncertainty stays within it."
-                @if is_own { " luxproof's own hand methods are judged by the accuracy that they claim, in public cases and in hidden variants. Beyond it a point is not judged: the cell is limited, never wrong." }
+                @if is_own { " luxproof's own hand methods (iesna) are judged by the accuracy that they claim, in public cases and in hidden variants. What they do not claim is not judged, and limits the cell." }
             }
         }
     }

@@ -7,7 +7,7 @@ use maud::{Markup, PreEscaped, html};
 use super::releases::release_data;
 use super::{STATES, frame, hidden_page, legend, not_published, published, shortened, sign};
 use crate::cards::anchor;
-use crate::stated_tolerance::summary;
+use crate::stated_tolerance::{summary, widest};
 use crate::{Capability, Cards, CardsError, CellCard, RendererCard, Since, Standing, StatedTolerance};
 
 const SCRIPT: &str = include_str!("index.js");
@@ -111,16 +111,16 @@ fn column_head(renderer: &RendererCard) -> Markup {
 
 fn row(cards: &Cards, capability: &Capability) -> Markup {
     let text = format!("{} {} {}", capability.group, capability.title, capability.question).to_lowercase();
-    let tolerance = row_tolerance(cards, capability);
+    let tolerances = row_tolerances(cards, capability);
     html! {
         tr data-text=(text) {
             th scope="row" {
                 a href={ "capabilities.html#" (capability.id) } { (capability.title) }
-                @if let Some(tolerance) = &tolerance { span.since { "tolerance " (tolerance.replace(" %", "\u{a0}%")) } }
+                @if let Some(tolerance) = summary(&tolerances) { span.since { "tolerance " (tolerance.replace(" %", "\u{a0}%")) } }
             }
             @for renderer in &cards.renderers {
                 @match renderer.releases.first().and_then(|release| release.cell(&capability.id)) {
-                    Some(cell) => (matrix_cell(renderer, cell, tolerance.as_deref())),
+                    Some(cell) => (matrix_cell(renderer, cell, &tolerances)),
                     None => td {},
                 }
             }
@@ -128,19 +128,21 @@ fn row(cards: &Cards, capability: &Capability) -> Markup {
     }
 }
 
-/// The tolerance of a capability: that of the renderers, or that of luxproof's own solvers where no renderer has values.
-fn row_tolerance(cards: &Cards, capability: &Capability) -> Option<String> {
-    [false, true].into_iter().find_map(|is_own| {
+/// The tolerances of a capability: those of the renderers, or of luxproof's own solvers where no renderer has values.
+fn row_tolerances(cards: &Cards, capability: &Capability) -> Vec<StatedTolerance> {
+    let [of_renderers, own] = [false, true].map(|is_own| {
         let releases = cards.renderers.iter().filter(|of| of.is_own == is_own).flat_map(|of| &of.releases);
         let cells = releases.filter_map(|release| release.cell(&capability.id));
-        summary(&StatedTolerance::all_of(cells.flat_map(|cell| cell.cell.tolerances.iter().cloned())))
-    })
+        StatedTolerance::all_of(cells.flat_map(|cell| cell.cell.tolerances.iter().cloned()))
+    });
+    if of_renderers.is_empty() { own } else { of_renderers }
 }
 
-fn matrix_cell(renderer: &RendererCard, cell: &CellCard, row_tolerance: Option<&str>) -> Markup {
+fn matrix_cell(renderer: &RendererCard, cell: &CellCard, of_row: &[StatedTolerance]) -> Markup {
     let standing = &cell.cell.standing;
-    let own_tolerance =
-        summary(&cell.cell.tolerances).filter(|tolerance| renderer.is_own && Some(tolerance.as_str()) != row_tolerance);
+    // Only hand methods have wider tolerances than renderers.
+    let is_wider = widest(&cell.cell.tolerances) > widest(of_row);
+    let own_tolerance = summary(&cell.cell.tolerances).filter(|_| renderer.is_own && is_wider);
     html! {
         td class={ "s-" (standing.key()) } data-renderer=(renderer.name) {
             a.cell href=(cell.page) {

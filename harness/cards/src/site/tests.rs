@@ -92,6 +92,10 @@ fn pages_state_the_stated_tolerance_of_rows_and_of_cells() {
     let mut reports = usual();
     reports[2].engines[0].role = luxproof_model::Role::Reference;
     reports[2].comparisons.iter_mut().for_each(|c| c.tolerance.relative = 0.1);
+    // A solver of luxproof's own with the tolerance of the renderers.
+    let mut solver = report("solver", "1", &[MadeCase::new("a").off(0.0, 0.0), MadeCase::new("b").off(0.0, 0.0)]);
+    solver.engines[0].role = luxproof_model::Role::Reference;
+    reports.push(solver);
     let files = site(&reports);
     let index = content(&files, "index.html");
     assert!(index.contains("tolerance 1\u{a0}%</span>"), "{index}");
@@ -99,7 +103,9 @@ fn pages_state_the_stated_tolerance_of_rows_and_of_cells() {
     let cell = index.split("<td ").find(|cell| cell.contains("data-renderer=\"other\"")).unwrap();
     assert!(cell.contains("judged by the accuracy that it claims: 10\u{a0}%"), "{cell}");
     assert!(content(&files, "renderers/rays/direct.html").contains("<strong>Tolerance</strong>: 1 % (the larger"));
-    assert!(content(&files, "renderers/other/direct.html").contains("never wrong"));
+    assert!(content(&files, "renderers/other/direct.html").contains("What they do not claim"));
+    let cell = index.split("<td ").find(|cell| cell.contains("data-renderer=\"solver\"")).unwrap();
+    assert!(cell.contains("s-accurate") && !cell.contains("hand method"), "{cell}");
     assert!(content(&files, "capabilities.html").contains("<dt>furnace</dt>"));
 }
 
