@@ -28,10 +28,10 @@ def main():
         for letter, (place, normal) in points(kind).items():
             corners = outline(kind, across, along, place)
             sums = [0.0] * 17
-            for above in (False, True):
-                part = cut(corners, place[2], above)
-                if len(part) >= 3:
-                    add(sums, part, above, place, normal, 2 if kind == "roof" else 0, sun, has_glass(variant))
+            # Each half lies above the horizon or below it.
+            for part in halves(corners, 2, place[2]):
+                above = sum(corner[2] - place[2] for corner in part) > 0
+                add(sums, part, above, place, normal, 2 if kind == "roof" else 0, sun, has_glass(variant))
             # The last sum is that of the ground, whose luminance is the same under every sky.
             cells = rows.setdefault(letter, (place, normal, {}))[2]
             size = variant[len(case_of(variant)) + 1:]
@@ -62,18 +62,6 @@ def upright(x, ys, zs):
     return [(x, ys[0], zs[0]), (x, ys[1], zs[0]), (x, ys[1], zs[1]), (x, ys[0], zs[1])]
 
 
-def cut(corners, height, above):
-    """The part of a polygon that lies above a height, or below it."""
-    out, sign = [], 1 if above else -1
-    for p, q in zip(corners, corners[1:] + corners[:1]):
-        hp, hq = sign * (p[2] - height), sign * (q[2] - height)
-        if hp >= 0:
-            out.append(p)
-        if hp * hq < 0:
-            out.append(tuple(a + (b - a) * hp / (hp - hq) for a, b in zip(p, q)))
-    return out if any(sign * (p[2] - height) > 0 for p in out) else []
-
-
 def add(sums, part, above, place, normal, axis, sun, is_glazed):
     """Adds a part of sky or ground to the sums, in triangles about the sun's image and the foot of the perpendicular."""
     plane = part[0][axis] - place[axis]
@@ -92,6 +80,7 @@ def add(sums, part, above, place, normal, axis, sun, is_glazed):
 
 
 def halves(polygon, axis, at):
+    """The parts of a polygon beyond a plane across an axis and before it, without those that are no more than a side."""
     sides = []
     for sign in (1, -1):
         out = []
@@ -101,7 +90,7 @@ def halves(polygon, axis, at):
                 out.append(p)
             if hp * hq < 0:
                 out.append(tuple(a + (b - a) * hp / (hp - hq) for a, b in zip(p, q)))
-        if len(out) >= 3:
+        if len(out) >= 3 and any(sign * (p[axis] - at) > 0 for p in out):
             sides.append(out)
     return sides
 
