@@ -16,7 +16,8 @@ use luxproof_scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
 
 /// Direct illuminance of a meter: the sum over luminaires that no obstacle hides, 0 behind the meter's plane.
 ///
-/// It is exact for point models. Of extended luminaires the nearest one, relative to its size, decides the validity.
+/// It is exact for point models. Of extended luminaires the nearest one, relative to its size, decides the validity. One
+/// with a hidden centre counts too: a part of it may show.
 /// Within the five-times rule the validity states the error for a Lambertian opening. Closer, the method does not
 /// apply.
 pub fn direct_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, NotApplicable> {
@@ -28,9 +29,9 @@ pub fn direct_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, No
             return Err(NotApplicable { method: METHOD, reason });
         }
         let hidden = scene.obstacles.iter().any(|obstacle| blocks(obstacle, meter.position_m, luminaire.position_m));
-        let contribution = if hidden { Lux(0.0) } else { from_luminaire(luminaire, meter) };
-        sum = sum + contribution;
-        if luminaire.model != LuminaireModel::Point && contribution.value() > 0.0 {
+        let unshaded = from_luminaire(luminaire, meter);
+        sum = sum + if hidden { Lux(0.0) } else { unshaded };
+        if luminaire.model != LuminaireModel::Point && unshaded.value() > 0.0 {
             let rule = FiveTimesRule::check(luminaire, meter);
             if nearest.is_none_or(|(other, _)| rule.distance_over_size < other.distance_over_size) {
                 nearest = Some((rule, luminaire));

@@ -94,6 +94,27 @@ fn five_times_rule_is_said_only_of_extended_models() {
 }
 
 #[test]
+fn a_near_luminaire_with_a_hidden_centre_is_no_case_for_the_method() {
+    // A plate hides the centre and a tenth of a panel of 0.6 m; the exact value is not 0.
+    let plate = |z: f64| Obstacle {
+        shape: Shape::Box { min_m: DVec3::new(-0.1, -0.1, z), max_m: DVec3::new(0.1, 0.1, z + 0.01) },
+        reflectance: 0.0,
+    };
+    let square = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    let read = |model, meter_z: f64, plate_z: f64| {
+        let luminaires = vec![luminaire(isotropic(), square, model)];
+        let scene = Scene { luminaires, obstacles: vec![plate(plate_z)], ..Scene::default() };
+        direct_illuminance(&scene, &facing_up(0.0, 0.0, meter_z))
+    };
+    assert!(matches!(Validity::of(&read(LuminaireModel::Area, -2.0, -0.1)), Validity::No(_)));
+    assert!(matches!(Validity::of(&read(LuminaireModel::Area, -6.0, -0.1)), Validity::Approximate(_)));
+    // A point is hidden or not, and behind the meter nothing is lost.
+    let hidden = read(LuminaireModel::Point, -2.0, -0.1).unwrap();
+    assert_eq!((hidden.illuminance, hidden.validity), (Lux(0.0), Validity::Supported));
+    assert_eq!(read(LuminaireModel::Area, 2.0, 1.0).unwrap().validity, Validity::Supported);
+}
+
+#[test]
 fn illuminance_falls_with_the_square_of_distance_and_the_cosine_of_incidence() {
     // Lambertian, 1000 cd on axis: E = I0 h^2 / d^4 at 3 m.
     let gamma: Vec<f64> = (0..=1800).map(|k| 0.05 * f64::from(k)).collect();
