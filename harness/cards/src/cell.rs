@@ -769,18 +769,20 @@ mod tests {
         );
     }
 
+    /// The cell of a capability that right values of the engine do not show.
+    fn not_shown(given: &[MadeCase]) -> Standing {
+        let mut capability = capabilities(2).capabilities[0].clone();
+        let why = "luxproof gives it the scale".to_owned();
+        capability.not_shown_by = vec![crate::NotShown { engine: ENGINE.to_owned(), why }];
+        let all = Capabilities { version: 1, capabilities: vec![capability.clone()] };
+        judge(&capability, &evidence_of(&report(ENGINE, "1.0", given), &all)).standing
+    }
+
     #[test]
     fn right_values_of_an_engine_that_was_given_the_answer_show_nothing_and_wrong_ones_do() {
-        let mut capability = capabilities(2).capabilities[0].clone();
-        capability.not_shown_by =
-            vec![crate::NotShown { engine: ENGINE.to_owned(), why: "luxproof gives it the scale".to_owned() }];
-        let judged = |given: &[MadeCase]| {
-            let capabilities = Capabilities { version: 1, capabilities: vec![capability.clone()] };
-            judge(&capability, &evidence_of(&report(ENGINE, "1.0", given), &capabilities)).standing
-        };
-        let right = judged(&three(MadeCase::new("a").off(0.0, 0.0)));
+        let right = not_shown(&three(MadeCase::new("a").off(0.0, 0.0)));
         assert_eq!(right, Standing::NotSupported { reason: "luxproof gives it the scale".to_owned() });
-        assert!(matches!(judged(&three(MadeCase::new("a").off(0.3, 0.0))), Standing::Wrong { .. }));
+        assert!(matches!(not_shown(&three(MadeCase::new("a").off(0.3, 0.0))), Standing::Wrong { .. }));
     }
 
     #[test]

@@ -133,6 +133,17 @@ fn profiles_multiply_and_flat_lights_add_their_cosine() {
     assert_eq!(candela(&flat, 0.0, 120.0), 0.0);
 }
 
+/// A point with the profile `a.ies`, such metadata and such an input.
+fn with_profile(metadata: &str, input: &str) -> (ImportedLuminaire, Photometry) {
+    only(&format!(
+        r#"def SphereLight "P" {metadata} {{ float inputs:intensity = 4
+        bool inputs:normalize = 1
+        bool treatAsPoint = 1
+        {input}
+        asset inputs:shaping:ies:file = @a.ies@ }}"#
+    ))
+}
+
 /// Without softness a light is full up to the angle of its cone and dark beyond. `ShapingAPI` has a default of 90 degrees.
 #[test]
 fn cones_cut_tables_off_and_have_the_default_of_their_schema() {
@@ -145,27 +156,18 @@ fn cones_cut_tables_off_and_have_the_default_of_their_schema() {
     for (gamma, expected) in [(0.0, 10.0), (30.4, 10.0), (30.6, 0.0), (120.0, 0.0)] {
         assert_eq!(candela(&isotropic, 45.0, gamma), expected, "{gamma}");
     }
-    let profile = |metadata: &str, angle: &str| {
-        only(&format!(
-            r#"def SphereLight "P" {metadata} {{ float inputs:intensity = 4
-            bool inputs:normalize = 1
-            bool treatAsPoint = 1
-            {angle}
-            asset inputs:shaping:ies:file = @a.ies@ }}"#
-        ))
-    };
     let applied = r#"(prepend apiSchemas = ["ShapingAPI"])"#;
     // The table falls from 200 at 60 degrees to 100 at 180.
     for (light, upwards) in [
-        (profile(applied, ""), 0.0),
-        (profile(applied, "float inputs:shaping:cone:angle = 180"), 100.0),
-        (profile("", ""), 100.0),
+        (with_profile(applied, ""), 0.0),
+        (with_profile(applied, "float inputs:shaping:cone:angle = 180"), 100.0),
+        (with_profile("", ""), 100.0),
     ] {
         assert_near(candela(&light, 0.0, 90.0), 175.0, 1e-12);
         assert_eq!(candela(&light, 0.0, 180.0), upwards);
         assert_eq!(light.0.flux_scale, 1.0);
     }
-    assert_eq!(candela(&profile(applied, ""), 0.0, 90.001), 0.0);
+    assert_eq!(candela(&with_profile(applied, ""), 0.0, 90.001), 0.0);
     // A flat light within a cone: the cosine, and nothing beyond.
     let flat = only(
         r#"def RectLight "R" { float inputs:intensity = 100

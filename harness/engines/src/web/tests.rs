@@ -78,16 +78,17 @@ fn a_page_that_throws_ends_its_driver_at_once_though_more_jobs_may_come() {
     use std::process::{Command, Stdio};
     use std::time::{Duration, Instant};
     let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(path, text).unwrap();
-    };
-    write("packages/package.json", "{}");
-    write("packages/node_modules/playwright-core/index.js", BROKEN_BROWSER);
-    write("packages/node_modules/babylon/package.json", r#"{"version": "9"}"#);
-    write(DRIVER.0, DRIVER.1);
-    write("job.json", r#"{"package": "babylon", "page": "page.js", "imports": {}, "lamps": []}"#);
+    let modules = folder.path().join("packages/node_modules");
+    for (file, text) in [
+        (folder.path().join("packages/package.json"), "{}"),
+        (modules.join("playwright-core/index.js"), BROKEN_BROWSER),
+        (modules.join("babylon/package.json"), r#"{"version": "9"}"#),
+        (folder.path().join(DRIVER.0), DRIVER.1),
+        (folder.path().join("job.json"), r#"{"package": "babylon", "page": "page.js", "imports": {}, "lamps": []}"#),
+    ] {
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(file, text).unwrap();
+    }
     let node = fixtures::test_root_of(&Web(Library::Babylon)).node().unwrap_or_else(|| "node".into());
     let mut driver = Command::new(node)
         .args([DRIVER.0, "--serve", "packages", "no-browser"])

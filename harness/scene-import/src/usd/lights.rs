@@ -262,10 +262,11 @@ impl Reader<'_, '_> {
         }
         let table = in_type_c.distribution;
         let nodes = shape.nodes_with(&table, cone_deg);
-        let intensity = |c: f64, gamma: f64| shape.seen_share(c, gamma) * table.intensity(c, gamma).value();
         // The opening of a sphere is the one that its file states.
         let opening = if matches!(shape, Shape::Sphere { .. }) { photometry.opening } else { opening };
-        Ok(self.drawn(prim, intensity, nodes, opening).map(|(profile, _)| (profile, candela)))
+        let drawn =
+            self.drawn(prim, |c, gamma| shape.seen_share(c, gamma) * table.intensity(c, gamma).value(), nodes, opening);
+        Ok(drawn.map(|(profile, _)| (profile, candela)))
     }
 
     /// A photometric file of intensities at the nodes of a table.
