@@ -54,7 +54,7 @@ impl BundleLimits {
             Trust::Stranger | Trust::Bundled => Self {
                 files: 10_000,
                 bytes: 256 << 20,
-                list_bytes: 8 << 20,
+                list_bytes: 4 << 20,
                 lock_bytes: 1 << 20,
                 report_bytes: MAX_FOREIGN_REPORT_BYTES,
             },
