@@ -411,6 +411,22 @@ mod tests {
     }
 
     #[test]
+    fn an_engine_that_repeats_exactly_changes_on_any_night_from_the_third_on_and_back() {
+        for first in 2..7 {
+            let mut nights = vec![0.0; 16];
+            nights[first..12].fill(0.5);
+            for seen in [first + 2, 16] {
+                let found = exact(&nights[..seen]);
+                let of_all = found.iter().filter(|c| c.level == Level::EngineAndProcedure);
+                let dates: Vec<(usize, usize, bool)> =
+                    of_all.map(|c| (c.night, c.noticed, matches!(c.course, Course::Step { .. }))).collect();
+                let expected = [(first, first + 1, true), (12, 13, true)];
+                assert_eq!(dates, &expected[..if seen == 16 { 2 } else { 1 }], "{first} {seen}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
     fn a_reading_where_the_reference_is_zero_changes_by_a_number() {
         let mut history = Synthetic { nights: 30, cases: 1, meters: 1, ..Synthetic::default() }.history();
         history.series.truncate(1);

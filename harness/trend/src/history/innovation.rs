@@ -284,10 +284,12 @@ pub(super) fn noise_of_comparisons(members: &[&Series], nights: usize) -> Vec<No
 /// What the stated errors of a group's members and the scatter among them let expect of its noise before each night.
 ///
 /// Of a variance of 1, in stated errors, the scatter among members shows one part. The rest, where it is certain, is noise that the
-/// members share: it does not average out. Of a single member, or without stated errors, nothing is expected.
+/// members share: it does not average out. Of a single member, or without stated errors, nothing is expected, unless all members have
+/// repeated exactly so far: then they are expected to go on.
 pub(super) fn expected_noise(members: &[&Series], nights: usize) -> Vec<Noise> {
     let mut means = vec![RunningMean::default(); members.len()];
     let (mut squares, mut freedom, mut sample) = (0.0, 0.0_f64, Sample::default());
+    let (mut exact_means, mut repeats_exactly, mut repetitions) = (means.clone(), true, 0);
     let mut before = vec![];
     for night in 0..nights {
         let has_heavy_members = sample.is_heavy(1.0) || sample.is_heavy(-1.0);
@@ -297,8 +299,15 @@ pub(super) fn expected_noise(members: &[&Series], nights: usize) -> Vec<Noise> {
             let shared = (1.0 - scatter * (1.0 + 2.0 * (2.0 / freedom).sqrt())).max(0.0);
             let expected = scatter + members.len() as f64 * shared;
             noise.spread = Spread::known(expected * STATED_NIGHTS as f64, STATED_NIGHTS);
+        } else if repeats_exactly && repetitions > 0 {
+            noise.spread = Spread::known(0.0, STATED_NIGHTS);
         }
         before.push(noise);
+        let all = members.iter().zip(&mut exact_means);
+        let innovations: Vec<Innovation> = all.filter_map(|(series, mean)| mean.update(series, night)).collect();
+        repetitions += innovations.len();
+        repeats_exactly &= innovations.iter().all(|Innovation(innovation)| innovation.abs() < MIN_SPREAD)
+            && members.iter().all(|series| series.std_error[night].is_nan() || series.std_error[night] == 0.0);
         let stated = members.iter().zip(&mut means).filter(|(series, _)| series.std_error[night] > 0.0);
         let updates: Vec<f64> = stated.filter_map(|(series, mean)| Some(mean.update(series, night)?.0)).collect();
         if updates.len() > 1 {

@@ -125,7 +125,9 @@ impl<'a> Segment<'a> {
         let mut waiting: Option<(usize, Innovation)> = None;
         for night in nights {
             let innovation = self.innovation(night);
-            let deviate = innovation.and_then(|i| self.noise.deviate(self.monitor.expected.get(night), i));
+            // A night that waits is not part of the noise that judges the next.
+            let known = waiting.map_or(night, |(outlying, _)| outlying);
+            let deviate = innovation.and_then(|i| self.noise.deviate(self.monitor.expected.get(known), i));
             let (Some(innovation), Some(deviate), true) = (innovation, deviate, night >= watched) else {
                 self.learn_level(night);
                 if let Some(innovation) = innovation {
