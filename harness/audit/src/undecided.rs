@@ -11,6 +11,10 @@ use luxproof_spec::Budget;
 
 /// A standard error of this part of the requested one has reached it: errors of few blocks are that uncertain.
 const REACHED: f64 = 1.25;
+/// A recording that took this part of the budget's seconds had no time for more: engines plan with three fifths of them.
+const SPENT_SHARE: f64 = 0.4;
+/// Standard errors that should fit into a tolerance.
+const ERRORS_IN_TOLERANCE: f64 = 4.0;
 /// With many samples the coverage factor stays below this in any family of up to a thousand points.
 const LARGE_COVERAGE_FACTOR: f64 = 6.0;
 
@@ -34,7 +38,7 @@ pub(crate) fn explain_undecided(
     budget: Budget,
 ) {
     let cut: Vec<&Recording> = recordings.iter().filter(|r| r.cut_to.is_some()).collect();
-    let limited = limited_by_time(comparisons, &cut, budget);
+    let limited = limited_by_time(comparisons, recordings, budget);
     for comparison in comparisons.iter_mut().filter(|c| c.verdict == Verdict::Undecided) {
         let failing = biases.iter().find(|b| b.fails && b.key == comparison.key && Some(b.basis) == comparison.basis());
         if let Some(bias) = failing {
@@ -52,11 +56,33 @@ pub(crate) fn explain_undecided(
     }
 }
 
-/// The recordings that had too little time: where the clock cut one, or where a point is short of the requested error.
-fn limited_by_time(comparisons: &[Comparison], cut: &[&Recording], budget: Budget) -> BTreeSet<ReadingKey> {
+/// The recordings that had too little time: where the clock cut one, where a point is short of the requested error, or
+/// where one is about there and no time was left.
+fn limited_by_time(comparisons: &[Comparison], recordings: &[Recording], budget: Budget) -> BTreeSet<ReadingKey> {
+    let is_spent = |r: &&Recording| r.work_s() >= SPENT_SHARE * budget.seconds;
+    let spent: BTreeSet<&ReadingKey> = recordings.iter().filter(is_spent).map(|r| &r.key).collect();
     let undecided = comparisons.iter().filter(|c| c.verdict == Verdict::Undecided);
-    let short = undecided.filter(|c| find_obstacle(c, budget) == Some(Obstacle::TimeLimit)).map(|c| &c.key);
-    short.chain(cut.iter().map(|r| &r.key)).cloned().collect()
+    let short = undecided.filter(|c| match find_obstacle(c, budget) {
+        Some(Obstacle::TimeLimit) => true,
+        Some(Obstacle::Noise) => spent.contains(&c.key) && is_above_requested(c, budget),
+        _ => false,
+    });
+    let cut = recordings.iter().filter(|r| r.cut_to.is_some()).map(|r| &r.key);
+    short.map(|c| &c.key).chain(cut).cloned().collect()
+}
+
+/// Whether the standard error of a point is above the requested one at all.
+fn is_above_requested(c: &Comparison, budget: Budget) -> bool {
+    let error = c.budget.as_ref().map_or(0.0, |parts| variance(parts, is_chance).sqrt());
+    error > budget.relative_error * c.value.unwrap_or(0.0).abs()
+}
+
+/// The advice on `relative_error`, where the requested one is too wide for the tolerance.
+fn advise_error(c: &Comparison, budget: Budget) -> Option<String> {
+    let reference = c.reference.as_ref().filter(|r| c.quantity.has_zero() && r.value > 0.0)?;
+    let wanted = c.tolerance.relative.max(c.tolerance.absolute / reference.value) / ERRORS_IN_TOLERANCE;
+    let digit = 10f64.powf(wanted.log10().floor());
+    (budget.relative_error > wanted).then(|| format!("lower `relative_error` to {}", (wanted / digit).floor() * digit))
 }
 
 /// Describes the obstacle with its size and the remedy; `cut` is the recording where the clock cut that.
@@ -66,22 +92,24 @@ fn describe(c: &Comparison, obstacle: Obstacle, cut: Option<&Recording>, budget:
         c.budget.as_ref().map_or_else(String::new, |budget| amount(c, variance(budget, is_chosen).sqrt()))
     };
     let asked = format!("{} %", trimmed_percent(budget.relative_error));
+    let further = advise_error(c, budget).map(|advice| format!(" and {advice}")).unwrap_or_default();
     match (obstacle, cut) {
         (Obstacle::Noise, _) => format!(
-            "undecided by noise: {engine} reached the standard error that the spec asks for ({}); lower `relative_error`, or use \
+            "undecided by noise: the standard error of {engine} is {} where the spec asks for {asked}; {}, or use \
              `--sampling accurate`",
-            size(is_chance)
+            size(is_chance),
+            advise_error(c, budget).unwrap_or_else(|| "lower `relative_error`".to_owned())
         ),
         (Obstacle::TimeLimit, Some(cut)) => format!(
             "undecided by the time limit: the machine was busy, {}, so the standard error of {engine} is {} {}; \
-             run the same command again when the machine is idle, or raise `seconds` above {}",
+             run the same command again when the machine is idle, or raise `seconds` above {}{further}",
             describe_work(cut),
             size(is_chance),
             coverage(c),
             budget.seconds
         ),
         (Obstacle::TimeLimit, None) => format!(
-            "undecided by the time limit: the standard error of {engine} is {}{} where the spec asks for {asked}; raise `seconds` above {}",
+            "undecided by the time limit: the standard error of {engine} is {}{} where the spec asks for {asked}; raise `seconds` above {}{further}",
             size(is_chance),
             coverage(c),
             budget.seconds
@@ -176,7 +204,11 @@ mod tests {
     #[test]
     fn each_obstacle_is_named_with_its_size_and_a_remedy() {
         for (uncertainty, reference_bound, said) in [
-            (Uncertainty::sampled(0.004, None), 0.0, ["by noise", "(0.40 %); lower `relative_error`"]),
+            (
+                Uncertainty::sampled(0.004, None),
+                0.0,
+                ["by noise", "0.40 % where the spec asks for 0.4 %; lower `relative_error`"],
+            ),
             (
                 Uncertainty::sampled(0.02, None),
                 0.0,
@@ -190,6 +222,22 @@ mod tests {
             assert!(said.iter().all(|part| reason.contains(part)), "{uncertainty:?}: {reason}");
         }
         assert_eq!(reason(Uncertainty::Exact, 0.0), "", "what is decided needs no reason");
+    }
+
+    #[test]
+    fn what_took_all_its_time_is_short_of_time_and_a_wide_request_is_told_with_it() {
+        let exact = recording("simulator", &[Estimate::exact(1.0)]);
+        let near = Estimate { value: 1.015, uncertainty: Uncertainty::sampled(0.0115, None) };
+        let wide = Budget { relative_error: 0.01, seconds: 30.0 };
+        for (work_s, cause) in [(18.0, "by the time limit"), (2.0, "by noise")] {
+            let subject = Recording { work_s: Some(work_s), ..recording("radiance", &[near]) };
+            let mut compared = built_in().compare(&task(1), &[&exact, &subject]);
+            explain_undecided(&mut compared, &[], &[subject], wide);
+            let reason = compared.iter().find(|c| c.key.engine == "radiance").and_then(|c| c.diagnosis.clone());
+            let reason = reason.unwrap_or_default();
+            assert!(reason.contains(cause) && reason.contains("lower `relative_error` to 0.005"), "{reason}");
+            assert!(reason.contains("1.13 % where the spec asks for 1 %") || reason.contains("1.15 %"), "{reason}");
+        }
     }
 
     #[test]

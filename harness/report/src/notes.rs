@@ -20,8 +20,7 @@ use luxproof_process::printable::Quoted;
 /// More meters than this are summarised instead of listed.
 pub(super) const LISTED_METERS: usize = 8;
 /// What to do about undecided comparisons.
-const UNDECIDED_NEXT_STEP: &str =
-    "next: a larger `budget` in the spec, then the same command; other remedies are in docs/undecided.md";
+const UNDECIDED_NEXT_STEP: &str = "next: change the spec's `budget` as each line says, then the same command; other remedies are in docs/undecided.md";
 /// What to do where the time limit cut all that is undecided.
 const NEXT_STEP_AFTER_TIME_LIMIT: &str =
     "next: the same command when the machine is idle, or a larger `budget`; other remedies are in docs/undecided.md";
