@@ -236,5 +236,7 @@ mod tests {
         }
         assert!(find_lints(&[metres]).is_empty());
         assert!(find_lints(&[room("", 1.0)])[0].message.contains("are these feet?"));
+        let in_metres = find_lints(&[room("unit: ft\n", 0.3048)]);
+        assert!(in_metres[0].message.contains("are its lengths metres, not feet?"), "{}", in_metres[0].message);
     }
 }

@@ -266,24 +266,31 @@ pub fn from_yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String
 
 /// A help text that names the known key closest to an unknown one, read off serde's message.
 fn nearest_key(message: &str) -> Option<String> {
-    meant_key(message).map(|key| format!("did you mean `{key}`?"))
+    let (unknown, known) = names_in(message)?;
+    ambiguous(unknown, &known).or_else(|| meant_key(message).map(|key| format!("did you mean `{key}`?")))
+}
+
+/// The unknown key and the known ones of a message of serde's.
+fn names_in(message: &str) -> Option<(&str, Vec<&str>)> {
+    let (_, rest) = message.split_once("unknown field `").or_else(|| message.split_once("unknown variant `"))?;
+    let mut names = rest.split('`').step_by(2);
+    let unknown = names.next()?;
+    Some((unknown, names.collect()))
 }
 
 /// The known key closest to the unknown one of a message of serde's.
 fn meant_key(message: &str) -> Option<&str> {
-    let (_, rest) = message.split_once("unknown field `").or_else(|| message.split_once("unknown variant `"))?;
-    let mut names = rest.split('`').step_by(2);
-    let unknown = names.next()?;
-    let known: Vec<&str> = names.collect();
+    let (unknown, known) = names_in(message)?;
+    if ambiguous(unknown, &known).is_some() {
+        return None;
+    }
     synonym(unknown, &known).or_else(|| nearest(unknown, known.iter().copied()))
 }
 
 /// Words for keys and procedures that users try first, each with the name in specs.
-const SYNONYMS: [(&str, &str); 27] = [
+const SYNONYMS: [(&str, &str); 25] = [
     ("ugr", "unified_glare_rating"),
     ("glare", "unified_glare_rating"),
-    ("illuminance", "total_illuminance"),
-    ("lux", "total_illuminance"),
     ("intensity", "luminous_intensity"),
     ("reflected_illuminance", "indirect_illuminance"),
     ("furniture", "obstacles"),
@@ -309,6 +316,18 @@ const SYNONYMS: [(&str, &str); 27] = [
     ("inches", "in"),
 ];
 
+/// Words that may mean any of several procedures, with those.
+const AMBIGUOUS: [&str; 3] = ["illuminance", "lux", "illuminances"];
+const ILLUMINANCES: [&str; 3] = ["direct_illuminance", "indirect_illuminance", "total_illuminance"];
+
+/// A help text for a word that may mean several of the known names.
+fn ambiguous(word: &str, known: &[&str]) -> Option<String> {
+    let [direct, indirect, total] = ILLUMINANCES;
+    let is_ambiguous = AMBIGUOUS.contains(&word.to_lowercase().as_str());
+    (is_ambiguous && ILLUMINANCES.iter().all(|name| known.contains(name)))
+        .then(|| format!("choose `{direct}`, `{indirect}`, or `{total}` for both"))
+}
+
 /// The known name that is another word for this one.
 fn synonym<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let word = word.to_lowercase();
@@ -322,6 +341,9 @@ const MAX_TOLD: usize = 20;
 /// A help text for an unknown name: the known one most like it, or else all of them.
 pub fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
     let names: Vec<&str> = known.clone().collect();
+    if let Some(help) = ambiguous(word, &names) {
+        return help;
+    }
     match synonym(word, &names).or_else(|| nearest(word, known.clone())) {
         Some(name) => format!("did you mean `{name}`?"),
         None if known.clone().next().is_none() => "there is none".to_owned(),
@@ -398,6 +420,15 @@ procedures:
         for (right, wrong, word, line, column, help) in [
             ("size_m", "sise_m", "sise_m", 3, Some(3), Some("did you mean `size_m`?")),
             ("0.5", "1.5", "1.5", 4, Some(36), None),
+            ("0.5", "50 %", "50 %", 4, None, Some("write 50 % as 0.5")),
+            (
+                "direct_illuminance",
+                "illuminance",
+                "illuminance",
+                10,
+                None,
+                Some("choose `direct_illuminance`, `indirect_illuminance`, or `total_illuminance` for both"),
+            ),
             ("[1, 1, 1]", "[1, much, 1]", "much", 8, None, None),
         ] {
             let error = parse(&MINIMAL.replace(right, wrong)).unwrap_err();

@@ -117,6 +117,12 @@ fn size(case: &Case) -> Option<SpecLint> {
         let message = format!("a room {z} m high whose desks are {desk} m high: are these feet?");
         return Some(SpecLint::new("room.size_m", message, help));
     }
+    let are_desks_in_metres = !heights.is_empty() && heights.iter().all(|h| DESKS_M.contains(&(h / FOOT_M)));
+    if are_desks_in_metres && ROOMS_M.contains(&(z / FOOT_M)) {
+        let [height, desk] = [z, heights[0]].map(|length_m| (100.0 * length_m).round() / 100.0);
+        let message = format!("a room {height} m high with desks at {desk} m: are its lengths metres, not feet?");
+        return Some(SpecLint::new("room.size_m", message, "remove `unit: ft` where lengths are metres"));
+    }
     // A ceiling that is as high in metres as its luminaires hang in feet was left in feet.
     let is_ceiling_in_feet = |l: &&Luminaire| (l.position_m.z / (z * FOOT_M) - 1.0).abs() < SAME_HEIGHT;
     let hung = case.scene.luminaires.iter().find(is_ceiling_in_feet);

@@ -6,6 +6,9 @@ use luxproof_scene::{Luminaire, LuminaireModel, flush};
 
 use crate::length_unit::LengthUnit;
 
+/// Lower than this, in metres, is no room.
+const LOWEST_ROOM_M: f64 = 0.1;
+
 /// What is wrong with a luminaire's place, and what to do.
 pub(super) fn unmountable(placed: &Placed, room: &Room, unit: LengthUnit) -> Option<(String, String)> {
     let luminaire = &placed.luminaire;
@@ -37,6 +40,13 @@ fn sticks_out(luminaire: &Luminaire, room: &Room, unit: LengthUnit) -> Option<(S
         Surface::Floor => "raise it",
         _ => "move it inwards",
     };
+    let height = room.size_m.z;
+    if unit != LengthUnit::M && height < LOWEST_ROOM_M {
+        return Some((
+            message,
+            format!("the room is only {} high: remove `unit` if its lengths are metres", unit.length(height)),
+        ));
+    }
     let flat = "a flat opening that is not tilted against a surface may lie in its plane";
     Some((message, format!("{moved} by {beyond}, or read it as `model: point`; {flat}")))
 }

@@ -258,7 +258,10 @@ fn shape_remedy(message: &str, key: &str, written: Option<&Value>) -> Option<Str
 fn percent_remedy(message: &str) -> Option<String> {
     let text = message.split_once("string \"")?.1.split_once('"')?.0;
     let percent: f64 = text.strip_suffix('%')?.trim().parse().ok()?;
-    (message.ends_with("expected f64") || message.contains("expected one number"))
+    let expects_a_number = ["expected f64", "expected one number", "expected a number between 0 and 1"];
+    expects_a_number
+        .iter()
+        .any(|words| message.contains(words))
         .then(|| format!("write {percent} % as {}", percent / 100.0))
 }
 
@@ -316,7 +319,9 @@ fn misplaced<T: JsonSchema>(value: &Value, flaw: &Flaw) -> Option<Moved> {
             let mut homes = homes::<T>(key).into_iter().filter(|home| !home.contains(['[', '*']));
             let home = homes.find(|home| {
                 let place = get(value, home);
-                home != here && place.is_some_and(|v| v.is_mapping() && v.get(key).is_none())
+                // A wrong indentation moves a key up, or down into the mapping before it.
+                let is_by_indentation = here.starts_with(home.as_str()) || parent(home) == here;
+                home != here && is_by_indentation && place.is_some_and(|v| v.is_mapping() && v.get(key).is_none())
             })?;
             Some(Moved { from: flaw.path.clone(), to: below(&home, key) })
         }

@@ -13,6 +13,8 @@ use crate::length_unit::LengthUnit;
 ///
 /// On the surface itself every renderer's answer depends on rounding.
 const SURFACE_MARGIN: f64 = 1e-9;
+/// How far messages advise to move a meter off a surface, in metres.
+const LEAST_MOVE_M: f64 = 1e-3;
 
 /// The most pairs of a point and a face of the room that one set's check tests.
 const MAX_LOOKS: usize = 20_000_000;
@@ -320,14 +322,18 @@ fn misplaced(
         return Some(("lies outside the room", within(room, unit)));
     }
     if !room.contains(point, margin) {
-        let help = "a meter on a surface sees half of nothing: move it inwards, by 1e-6 m say".to_owned();
+        let help = format!("move it into the room, by {} at least", unit.length(LEAST_MOVE_M));
         return Some(("lies on a surface of the room", help));
     }
     if let Some(enclosure) = enclosure.filter(|e| !e.contains(point, margin)) {
         return Some(("lies outside the room's walls, or on one", beyond_walls(enclosure)));
     }
     if scene.obstacles.iter().any(|obstacle| is_in_box(point, &obstacle.shape)) {
-        return Some(("lies inside an obstacle or on its surface", "move it out, by 1e-6 m at least".to_owned()));
+        let least = unit.length(LEAST_MOVE_M);
+        let help = format!(
+            "move it out, by {least} at least: a work plane lies above its desks; `distance_m` moves a `surface`"
+        );
+        return Some(("lies inside an obstacle or on its surface", help));
     }
     if scene.luminaires.iter().any(|l| l.position_m.distance(point) <= margin) {
         return Some(("lies in a luminaire's photometric centre", "move it away".to_owned()));

@@ -65,8 +65,11 @@ impl Builder<'_> {
         let all: Vec<String> = spec.luminaires.iter().flat_map(ids_of).collect();
         let is_there = all.iter().any(|id| id == luminaire) || self.mended.holds("luminaires");
         let is_mended = (0..spec.luminaires.len()).any(|k| self.mended.holds(&format!("luminaires[{k}].id")));
-        let (at, help) =
-            (format!("procedures.{procedure}.luminaire"), suggestion(luminaire, all.iter().map(String::as_str)));
+        // Of an array its name is suggested, not one of its luminaires.
+        let arrays = spec.luminaires.iter().map(|l| l.id.as_str());
+        let names: Vec<&str> =
+            if luminaire.contains('[') { all.iter().map(String::as_str).collect() } else { arrays.collect() };
+        let (at, help) = (format!("procedures.{procedure}.luminaire"), suggestion(luminaire, names.into_iter()));
         self.check(is_there || is_mended, &at, format!("there is no luminaire `{luminaire}`"), help);
     }
 
