@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
-use super::verdict_lines::{is_relative, largest_error};
+use super::verdict_lines::{error_and_tolerance, is_relative, largest_error, largest_of};
 use super::words::{mark, percent};
 use luxproof_model::Report;
 use luxproof_model::{Basis, Comparison, Verdict};
@@ -33,6 +33,8 @@ pub(super) enum Cell {
         of: usize,
         /// The largest relative deviation, signed.
         deviation: Option<f64>,
+        /// The largest deviation with its unit, where it is not judged as a relative one.
+        absolute: Option<String>,
         /// The index in the report of the first comparison with this verdict.
         first: usize,
     },
@@ -59,10 +61,7 @@ impl Cell {
     /// The cell without counts, for narrow screens.
     pub(super) fn brief(&self) -> String {
         match self {
-            Self::Judged { verdict, deviation, .. } => {
-                let percent = deviation.map(|d| format!(" {}", percent(d))).unwrap_or_default();
-                format!("{}{percent}", mark(*verdict))
-            }
+            Self::Judged { verdict, .. } => format!("{}{}", mark(*verdict), self.largest()),
             _ => self.text(),
         }
     }
@@ -72,12 +71,18 @@ impl Cell {
             Self::IsReference => "reference".to_owned(),
             Self::Skipped => "skipped".to_owned(),
             Self::Empty => "-".to_owned(),
-            Self::Judged { verdict, having, of, deviation, .. } => {
-                let percent = deviation.map(|d| format!(" {}", percent(d))).unwrap_or_default();
+            Self::Judged { verdict, having, of, .. } => {
                 let count = if having == of { format!("{of}") } else { format!("{having}/{of}") };
-                format!("{} {count}{percent}", mark(*verdict))
+                format!("{} {count}{}", mark(*verdict), self.largest())
             }
         }
+    }
+
+    /// The largest deviation after a blank, where there is one.
+    fn largest(&self) -> String {
+        let Self::Judged { deviation, absolute, .. } = self else { return String::new() };
+        let largest = deviation.map(percent).or_else(|| absolute.clone());
+        largest.map(|text| format!(" {text}")).unwrap_or_default()
     }
 }
 
@@ -159,13 +164,15 @@ fn cell(unread: &UnreadJobs<'_>, key: &ReadingKey, of_row: &[IndexedComparison<'
             Cell::Empty
         };
     };
+    let all: Vec<&Comparison> = of_engine.iter().map(|(_, c)| *c).collect();
+    // A cell that is not judged shows what is not judged.
+    let largest = if verdict == Verdict::NotJudged { largest_of(&all) } else { largest_error(&all) };
     Cell::Judged {
         verdict,
         having: of_engine.iter().filter(|(_, c)| c.verdict == verdict).count(),
         of: of_engine.len(),
-        deviation: largest_error(&of_engine.iter().map(|(_, c)| *c).collect::<Vec<_>>())
-            .filter(|c| is_relative(c))
-            .and_then(|c| c.relative_deviation),
+        deviation: largest.filter(|c| is_relative(c)).and_then(|c| c.relative_deviation),
+        absolute: largest.filter(|c| !is_relative(c)).map(|c| error_and_tolerance(c).0),
         first: of_engine.iter().find(|(_, c)| c.verdict == verdict).map_or(0, |(k, _)| *k),
     }
 }

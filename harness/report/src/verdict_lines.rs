@@ -60,10 +60,19 @@ impl<'a> VerdictLine<'a> {
 pub(super) fn largest_error<'a>(comparisons: &[&'a Comparison]) -> Option<&'a Comparison> {
     let with_error = comparisons.iter().copied().filter(|c| c.deviation.is_some()).collect_vec();
     let judged = with_error.iter().copied().filter(|c| c.verdict != Verdict::NotJudged).collect_vec();
-    let all = if judged.is_empty() { with_error } else { judged };
+    largest_of(if judged.is_empty() { &with_error } else { &judged })
+}
+
+/// The comparison with the largest error, judged or not.
+pub(super) fn largest_of<'a>(all: &[&'a Comparison]) -> Option<&'a Comparison> {
     let relative = all.iter().copied().filter(|c| is_relative(c) && c.relative_deviation.is_some());
     let largest = relative.max_by(|a, b| size(a.relative_deviation).total_cmp(&size(b.relative_deviation)));
-    largest.or_else(|| all.into_iter().max_by(|a, b| size(a.deviation).total_cmp(&size(b.deviation))))
+    largest.or_else(|| {
+        all.iter()
+            .copied()
+            .filter(|c| c.deviation.is_some())
+            .max_by(|a, b| size(a.deviation).total_cmp(&size(b.deviation)))
+    })
 }
 
 fn size(deviation: Option<f64>) -> f64 {

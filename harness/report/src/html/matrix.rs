@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use super::super::matrix::{Cell, Row, matrix};
 use super::super::symmetry::symmetry_lines;
 use super::palette::Palette;
-use super::{Pages, class, glyph, percent};
+use super::{Pages, class, glyph, minus, percent};
 use luxproof_model::Report;
 use luxproof_model::Verdict;
 
@@ -85,12 +85,13 @@ fn draw_cell(cell: &Cell, row: &Row, engine: &str, draw_judged: &dyn Fn(&JudgedC
         Cell::IsReference => html! { td.quiet data-engine=(engine) { "reference" } },
         Cell::Skipped => html! { td.quiet data-engine=(engine) { a href="#notes" { "skipped" } } },
         Cell::Empty => html! { td.quiet.empty { "–" } },
-        Cell::Judged { verdict, having, of, deviation, first } => {
+        Cell::Judged { verdict, having, of, deviation, absolute, first } => {
             let words = html! {
                 span.unseen { (engine) ", " (row.procedure.title()) " against " (row.basis) ": " (verdict.name()) " " }
                 span.glyph aria-hidden="true" { (glyph(*verdict)) } " "
                 span.count { @if having == of { (of) } @else { (having) "/" (of) } }
                 @if let Some(deviation) = deviation { span.most { (percent(*deviation)) } }
+                @if let Some(absolute) = absolute { span.most { (minus(absolute)) } }
             };
             draw_judged(&JudgedCell { first: *first, row, engine, verdict: *verdict, words })
         }

@@ -70,6 +70,20 @@ fn two_procedures_of_192_meters_and_five_engines_stay_below_three_megabytes() {
     assert_eq!(page.matches("<tr data-row=").count(), 2 * 5 * 192, "every reading has its row");
 }
 
+#[test]
+fn glare_ratings_are_drawn_and_told_in_their_unit() {
+    let mut report = report(&[ProcedureId::UnifiedGlareRating], "room", "a room");
+    for c in &mut report.comparisons {
+        c.quantity = Quantity::GlareRating;
+        c.relative_deviation = None;
+        (c.deviation, c.tolerance) = (Some(0.02), luxproof_model::Tolerance { relative: 0.0, absolute: 0.1 });
+    }
+    let page = page(&report, &[]);
+    assert!(page.contains("deviation from the reference [UGR]") && page.contains("+0.020 UGR"), "{}", page.len());
+    let drawing = page.split("deviation from the reference [UGR]").nth(1).and_then(|rest| rest.split("</svg>").next());
+    assert!(drawing.is_some_and(|drawing| drawing.contains("class=\"band\"")), "no tolerance band");
+}
+
 /// A report in which the time limit cut an engine: one point is undecided, another passes with the largest error.
 fn cut_report() -> Report {
     let mut report = report(&[ProcedureId::IndirectIlluminance], "room", "a room");

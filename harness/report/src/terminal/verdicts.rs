@@ -65,9 +65,11 @@ pub(super) fn append_calibration(report: &Report, screen: Screen, text: &mut Str
     for (engine, scenes) in &passing.chunk_by(|line| line.engine) {
         engines.entry(scenes.count()).or_default().push(engine.as_str());
     }
-    let parts =
-        engines.iter().rev().map(|(scenes, names)| format!("{} passes {}", names.join(", "), plural(*scenes, "scene")));
-    let parts = parts.collect_vec();
+    let mut parts = vec![];
+    for (scenes, names) in engines.iter().rev() {
+        let verb = if names.len() == 1 { "passes" } else { "pass" };
+        parts.push(format!("{} {verb} {}", names.join(", "), plural(*scenes, "scene")));
+    }
     if !parts.is_empty() {
         let line = format!("Calibration (scenes with known results): {}", parts.join("; "));
         writeln!(text, " {}", screen.wrap(&line)).ok();

@@ -24,8 +24,10 @@ const LANES: [f64; 5] = [0.0, -4.0, 4.0, -2.0, 2.0];
 const MIN_INTERVAL_LENGTH: f64 = 3.0;
 
 pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette, marks: Marks) -> Markup {
-    let compared: Vec<&Comparison> =
-        group.comparisons.iter().copied().filter(|c| c.relative_deviation.is_some() && is_relative(c)).collect();
+    // Ratings have no zero, and so no percent of it.
+    let unit = group.comparisons.iter().find(|c| !c.quantity.has_zero()).map(|c| c.quantity.unit());
+    let is_drawn = |c: &&Comparison| drawn(c).is_some() && (unit.is_some() || is_relative(c));
+    let compared: Vec<&Comparison> = group.comparisons.iter().copied().filter(is_drawn).collect();
     let scale = scale(&compared);
     let mut y = 4.0;
     let mut blocks: Vec<Markup> = vec![];
@@ -47,10 +49,10 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette, marks
             (line(if tick == 0.0 { "zero" } else { "grid" }, [scale.x(tick), 4.0], [scale.x(tick), bottom]))
             (text("tick", "middle", [scale.x(tick), bottom + 14.0], &label(tick)))
         }
-        (text("axis", "middle", [LEFT + 0.5 * (WIDTH - LEFT - RIGHT), bottom + 30.0], "deviation from the reference [%]"))
+        (text("axis", "middle", [LEFT + 0.5 * (WIDTH - LEFT - RIGHT), bottom + 30.0], &format!("deviation from the reference [{}]", unit.unwrap_or("%"))))
         @for block in blocks { (block) }
     };
-    let caption = html! { "One mark for each meter; bars: expanded uncertainty; shaded: the tolerance. Linear scale within ± 0.01 %, logarithmic beyond."
+    let caption = html! { "One mark for each meter; bars: expanded uncertainty; shaded: the tolerance. Linear scale within ± 0.01, logarithmic beyond."
         @if marks == Marks::Seen { " Of marks at the same place one is drawn." }
     };
     figure(&group.title(report, "deviations"), bottom + 36.0, &drawing, &caption)
@@ -58,13 +60,22 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette, marks
 
 /// A scale that holds all deviations and tolerances.
 fn scale(compared: &[&Comparison]) -> DeviationScale {
-    let tolerances = compared.iter().filter_map(|c| allowed_percent(c)).filter(|allowed| *allowed < 100.0);
-    let deviations = compared.iter().filter_map(|c| c.relative_deviation).map(|d| 100.0 * d.abs());
+    let tolerances = compared.iter().filter_map(|c| allowed(c)).filter(|allowed| *allowed < 100.0);
+    let deviations = compared.iter().filter_map(|c| drawn(c)).map(f64::abs);
     DeviationScale::new(deviations.chain(tolerances).fold(0.1, f64::max), LEFT, WIDTH - LEFT - RIGHT)
 }
 
-fn allowed_percent(c: &Comparison) -> Option<f64> {
-    Some(100.0 * c.allowed() / c.reference.as_ref()?.value).filter(|a| a.is_finite())
+/// What a deviation is multiplied by: percent of the reference, and 1 for ratings.
+fn factor(c: &Comparison) -> Option<f64> {
+    if c.quantity.has_zero() { Some(100.0 / c.reference.as_ref()?.value) } else { Some(1.0) }
+}
+
+fn drawn(c: &Comparison) -> Option<f64> {
+    Some(c.deviation? * factor(c)?).filter(|d| d.is_finite())
+}
+
+fn allowed(c: &Comparison) -> Option<f64> {
+    Some(c.allowed() * factor(c)?).filter(|a| a.is_finite())
 }
 
 /// The line of one engine against one basis.
@@ -79,8 +90,8 @@ impl Row<'_> {
     fn draw(&self, scale: &DeviationScale, palette: &Palette, marks: Marks) -> Markup {
         let Self { comparisons, engine, y } = self;
         // An absolute tolerance differs from meter to meter in percent; the narrowest is drawn.
-        let allowed = comparisons.iter().filter_map(|c| allowed_percent(c)).fold(f64::INFINITY, f64::min);
-        let (from, to) = (scale.x(-allowed), scale.x(allowed));
+        let narrowest = comparisons.iter().filter_map(|c| allowed(c)).fold(f64::INFINITY, f64::min);
+        let (from, to) = (scale.x(-narrowest), scale.x(narrowest));
         let class = format!("line e{}", palette.index(engine));
         let mut places = BTreeSet::new();
         let mut shown: Vec<(usize, &Comparison)> = comparisons.iter().copied().enumerate().collect();
@@ -94,7 +105,7 @@ impl Row<'_> {
                 @if let Some([from, to]) = interval(c, scale) { (line(&class, [from, self.lane(*k)], [to, self.lane(*k)])) }
             }
             @for (k, c) in &shown {
-                @if let Some(d) = c.relative_deviation { (palette.mark(engine, [scale.x(100.0 * d), self.lane(*k)], 3.2)) }
+                @if let Some(d) = drawn(c) { (palette.mark(engine, [scale.x(d), self.lane(*k)], 3.2)) }
             }
         }
     }
@@ -108,13 +119,12 @@ impl Row<'_> {
 
 /// The place of a mark in whole user units; marks at the same place hide one another.
 fn mark_place(c: &Comparison, scale: &DeviationScale) -> Option<i64> {
-    c.relative_deviation.map(|d| scale.x(100.0 * d).round() as i64)
+    drawn(c).map(|d| scale.x(d).round() as i64)
 }
 
 /// The ends of a deviation's interval on the scale; `None` where it is too short to be seen.
 fn interval(c: &Comparison, scale: &DeviationScale) -> Option<[f64; 2]> {
-    let reference = c.reference.as_ref()?.value;
-    let (d, u) = (c.deviation?, c.budget.as_ref()?.expanded);
-    let ends = [100.0 * (d - u) / reference, 100.0 * (d + u) / reference].map(|p| scale.x(p));
+    let (d, u, factor) = (c.deviation?, c.budget.as_ref()?.expanded, factor(c)?);
+    let ends = [d - u, d + u].map(|end| scale.x(factor * end));
     (ends[1] - ends[0] > MIN_INTERVAL_LENGTH).then_some(ends)
 }
