@@ -57,7 +57,7 @@ fn a_first_spec_takes_mounting_model_and_meters_from_the_file_and_the_room() {
     assert!(text.contains("surface: {of: floor, distance_m: 0.75, margin_m: 0.5}"), "{text}");
     assert!(text.contains("at_m: [2.5, 2, 2.7]"), "{text}");
     assert!(text.contains("model: auto ") && text.contains("# area here: desk["), "{text}");
-    assert!(check.contains("direct_illuminance at 48 meters") && check.contains("model: area (auto)"), "{check}");
+    assert!(check.contains("direct_illuminance at 48 points") && check.contains("model: area (auto)"), "{check}");
     // A luminaire that shines upwards hangs; one without an opening is a point; a corridor has no margin.
     let (text, _) = office("b.yaml", "pendant.ies", "5,4,2.8");
     assert!(text.contains("at_m: [2.5, 2, 2.3]"), "{text}");

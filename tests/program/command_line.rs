@@ -255,7 +255,7 @@ fn our_own_witnesses_agree_and_every_view_of_the_run_says_so() {
 #[test]
 fn check_prints_the_plan_and_starts_nothing() {
     let room = room();
-    room.luxproof(&["check", "spec.yaml"]).exits(0).prints("direct_illuminance at 2 meters");
+    room.luxproof(&["check", "spec.yaml"]).exits(0).prints("direct_illuminance at 2 points");
     assert!(!room.path("luxproof-out").exists());
 }
 

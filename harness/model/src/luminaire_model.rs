@@ -79,10 +79,10 @@ impl LuminaireModelChoice {
         }
         match (&self.nearest, self.too_near()) {
             (Some(_), Some(place)) => {
-                format!("{} is {:.2} sizes away, below {FIVE_TIMES}", place.name, place.distance_m / size_m)
+                format!("{}, below {FIVE_TIMES}", place.in_times(size_m))
             }
             (Some(place), None) => {
-                format!("{} is {:.2} sizes away, not below {FIVE_TIMES}", place.name, place.distance_m / size_m)
+                format!("{}, not below {FIVE_TIMES}", place.in_times(size_m))
             }
             (None, _) => "no point or lit surface is near".to_owned(),
         }
@@ -90,6 +90,12 @@ impl LuminaireModelChoice {
 }
 
 impl NearestPlace {
+    /// The distance in metres and as a multiple of the opening's size.
+    fn in_times(&self, size_m: f64) -> String {
+        let Self { name, distance_m, .. } = self;
+        format!("{name} is {distance_m:.2} m away, {:.2} times its size", distance_m / size_m)
+    }
+
     /// The distance in metres and in sizes of the opening.
     pub fn in_sizes(&self, largest_dimension_m: f64) -> String {
         let (distance_m, sizes) = (self.distance_m, self.distance_m / largest_dimension_m);
@@ -121,7 +127,10 @@ mod tests {
 
     #[test]
     fn a_choice_states_the_distance_in_sizes() {
-        assert_eq!(panel("p1", 2.0).to_string(), "area (auto) for p1: desk[5] is 4.00 sizes away, below 5");
+        assert_eq!(
+            panel("p1", 2.0).to_string(),
+            "area (auto) for p1: desk[5] is 2.00 m away, 4.00 times its size, below 5"
+        );
         assert_eq!(panel("p1", 2.5).too_near(), None);
     }
 

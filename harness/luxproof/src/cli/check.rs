@@ -52,7 +52,7 @@ pub(super) fn check(selected: &Selected, site: &EngineRoot, trust: Trust) -> Res
                 .into_diagnostic()?;
         }
         for task in &plan.tasks {
-            writeln!(out, "  {} at {}", task.procedure, plural(task.targets.len(), "meter")).into_diagnostic()?;
+            writeln!(out, "  {} at {}", task.procedure, plural(task.targets.len(), "point")).into_diagnostic()?;
             for run in plan.runs.iter().filter(|r| plan.tasks[r.task].procedure == task.procedure) {
                 let engine = &plan.engines[run.engine].engine;
                 let note = run.approximation.as_ref().map(|a| format!(", approximate: {a}")).unwrap_or_default();
@@ -60,8 +60,12 @@ pub(super) fn check(selected: &Selected, site: &EngineRoot, trust: Trust) -> Res
                 writeln!(out, "    run  {:<10} {cost}{note}", engine.name()).into_diagnostic()?;
             }
             for skip in plan.skips.iter().filter(|s| s.key.procedure == task.procedure) {
+                if skip.scope.leaves_no_reading() {
+                    writeln!(out, "    skip {:<10} {}", skip.key.engine, skip.reason).into_diagnostic()?;
+                    continue;
+                }
                 let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
-                writeln!(out, "    skip {:<10} {}{saved}", skip.key.engine, skip.reason).into_diagnostic()?;
+                writeln!(out, "    less {:<10} {}{saved}", skip.key.engine, skip.reason).into_diagnostic()?;
             }
         }
         if let Some(record) = &policy.record {
