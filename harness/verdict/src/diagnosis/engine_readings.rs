@@ -6,8 +6,6 @@ use luxproof_model::{Comparison, Verdict};
 
 /// Relative error of a prediction that no uncertainty of a reading covers: small biases of engines.
 const SLACK: f64 = 5e-4;
-/// The same error where predictions rest on thinned tables.
-const THINNED_SLACK: f64 = 2e-3;
 /// The same error of rough predictions.
 const ROUGH_SLACK: f64 = 1e-2;
 /// Error of rough predictions as a part of the change that they predict.
@@ -63,7 +61,7 @@ impl EngineReadings {
             allowed: vec![],
             fails,
             design_effect: 1.0,
-            slack: if of.is_thinned() { THINNED_SLACK } else { SLACK },
+            slack: SLACK,
             floor: 0.0,
             is_rough: false,
         };

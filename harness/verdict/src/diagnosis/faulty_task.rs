@@ -30,6 +30,7 @@ const WORK_OF_OPENING: u64 = 20_000;
 const FINE_WORK_PER_SCENE: u64 = 1_000_000;
 const FINE_WORK_PER_LUMINAIRE: u64 = 250_000;
 const FINE_WORK_PER_METER: u64 = 4_000;
+const FINE_WORK_PER_NODE: u64 = 50;
 /// Steps from meter to meter of a grid agree to this many meters.
 const MAX_STEP_DIFFERENCE_M: f64 = 1e-6;
 
@@ -296,11 +297,6 @@ impl Model {
         self.task.transport == Transport::Direct
     }
 
-    /// Whether predictions rest on thinned tables.
-    pub fn is_thinned(&self) -> bool {
-        !self.is_cheap() && self.task.scene.luminaires.iter().any(|l| tables::thin(&mut l.clone()))
-    }
-
     /// The same task at some of its targets.
     #[must_use]
     pub fn select(&self, places: &[usize]) -> Self {
@@ -490,7 +486,13 @@ fn count_work(task: &Task, sensors: u64, fidelity: Fidelity, has_moved_meters: b
     let reflected = match fidelity {
         _ if !is_bare(scene) => 0,
         Fidelity::Rough => PatchRadiosity::count_work(luminaires, if has_moved_meters { sensors } else { 0 }),
-        Fidelity::Fine => FINE_WORK_PER_SCENE + FINE_WORK_PER_LUMINAIRE * luminaires + FINE_WORK_PER_METER * sensors,
+        Fidelity::Fine => {
+            let nodes: u64 = scene.luminaires.iter().map(count_nodes).sum();
+            FINE_WORK_PER_SCENE
+                + FINE_WORK_PER_LUMINAIRE * luminaires
+                + FINE_WORK_PER_METER * sensors
+                + FINE_WORK_PER_NODE * nodes
+        }
     };
     match task.transport {
         Transport::Direct => direct,
@@ -597,9 +599,6 @@ fn solve_reflected(
     }
     let mut scene = scene.clone();
     for luminaire in &mut scene.luminaires {
-        if radiosity.is_none() {
-            tables::thin(luminaire);
-        }
         // Light on its way to a surface depends on no meter: of all laws only that of the intensity matters.
         if law == (Law { intensity: 2, ..Law::RIGHT }) {
             tables::square_candela(luminaire);

@@ -123,28 +123,34 @@ fn the_reader_of_these_tests_is_right() {
     assert_eq!(causes(&tasks(), &|model| read(model, linear, one)), []);
 }
 
+/// A program with reflections that takes the nearest angles, by the simulator with a table of steps.
 #[test]
-fn a_thinned_table_keeps_its_ends_and_its_bends() {
-    // Straight from 0 to 45 and 90 degrees, then dark at once, in steps of a degree and in planes of ten degrees.
-    let gamma_deg: Vec<f64> = (0..=180).map(f64::from).collect();
-    let c_deg: Vec<f64> = (0..=36).map(|k| 10.0 * f64::from(k)).collect();
-    let row = gamma_deg.iter().map(|g| {
-        if *g <= 45.0 {
-            300.0 - 4.0 * g
-        } else if *g <= 90.0 {
-            165.0 - g
-        } else {
-            0.0
+fn a_table_without_interpolation_is_named_where_reflected_light_shows_it_too() {
+    let tasks = known::tasks().into_iter().filter(|t| t.scene.obstacles.is_empty()).collect_vec();
+    let found = causes(&tasks, &|m| {
+        if m.task.transport == Transport::Direct {
+            return read(m, |t, c, g| weighted(t, c, g, |part| if part < 0.5 { 0.0 } else { 1.0 }), one);
         }
+        let mut task = m.task.clone();
+        task.scene.luminaires.iter_mut().for_each(take_nearest);
+        truth(&task).unwrap()
     });
-    let row: Vec<f64> = row.collect();
-    let table = Table::new(c_deg.clone(), gamma_deg, c_deg.iter().flat_map(|_| row.clone()).collect()).unwrap();
-    let mut luminaire = fixtures::luminaire("long", DVec3::ZERO, table.clone());
-    assert!(super::tables::thin(&mut luminaire));
-    let thinned = &luminaire.photometry.distribution;
-    assert_eq!(thinned.gamma_deg(), [0.0, 45.0, 90.0, 91.0, 180.0]);
-    let [before, after] = [&table, thinned].map(|table| table.flux().value());
-    assert!((after / before - 1.0).abs() < 1e-9, "{after} for {before}");
+    assert!(!found.is_empty() && found.iter().all(|c| c.what.contains("the nearest angle counts")), "{found:?}");
+}
+
+/// Steps midway between the angles of a table, each side of a step a thousandth of a degree wide.
+fn take_nearest(luminaire: &mut Luminaire) {
+    let table = luminaire.photometry.distribution.full_circle();
+    let with_steps = |angles: &[f64]| {
+        let middles = angles.windows(2).map(|pair| f64::midpoint(pair[0], pair[1]));
+        let steps = middles.flat_map(|middle| [middle - 5e-4, middle + 5e-4]);
+        angles.iter().copied().chain(steps).sorted_by(f64::total_cmp).collect_vec()
+    };
+    let (c_deg, gamma_deg) = (with_steps(table.c_deg()), with_steps(table.gamma_deg()));
+    let nodes = c_deg.iter().cartesian_product(&gamma_deg);
+    let candela = nodes.map(|(c, g)| weighted(&table, *c, *g, f64::round)).collect();
+    let stepped = Table::new(c_deg, gamma_deg, candela).unwrap();
+    luminaire.photometry = std::sync::Arc::new(luminaire.photometry.with_distribution(stepped));
 }
 
 #[test]

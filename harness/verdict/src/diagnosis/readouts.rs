@@ -19,6 +19,10 @@ pub(super) fn readout_kinds() -> Vec<Fault> {
         faulty.readouts.push(Readout::Power { exponent: p[0], level: p[1] });
         true
     });
+    let of_lux = Fault::new("readout", "readings in lux are raised to the power of {0}", |faulty, p| {
+        faulty.readouts.push(Readout::Power { exponent: p[0], level: 1.0 });
+        true
+    });
     let level = |starts: &[f64]| Parameter {
         unit: " lx",
         starts: starts.to_vec(),
@@ -34,12 +38,11 @@ pub(super) fn readout_kinds() -> Vec<Fault> {
         faulty.readouts.push(Readout::Plus(-p[0]));
         true
     });
+    let exponent = Parameter { starts: vec![0.45, 0.9, 1.1, 2.2], ..Parameter::new("", 1.0, 0.02, (0.1, 10.0)) };
     vec![
+        of_lux.about("power of readings").with_parameters([exponent.clone()]),
         // At a power of 1 the level has no effect, and at none does a fit begin at the brightest reading.
-        power.about("power of readings").with_parameters([
-            Parameter { starts: vec![0.45, 0.9, 1.1, 2.2], ..Parameter::new("", 1.0, 0.02, (0.1, 10.0)) },
-            Parameter { step: 0.1, ..level(&[]) },
-        ]),
+        power.about("power of readings").with_parameters([exponent, Parameter { step: 0.1, ..level(&[]) }]),
         at_least.about("least reading").with_parameters([level(&[0.1, 1.0, 10.0, 100.0])]),
         subtracted.about("offset").with_parameters([level(&[0.0])]),
     ]

@@ -7,12 +7,6 @@ use std::sync::Arc;
 use luxproof_photometry::LuminousIntensityDistribution;
 use luxproof_scene::Luminaire;
 
-/// A table of more nodes than this is thinned where only its reflected light counts.
-const MAX_NODES: usize = 600;
-/// Parts of the peak to which a thinned table is straight between its angles, tried in turn.
-const THINNED_SHARES: [f64; 4] = [1e-6, 1e-3, 3e-3, 1e-2];
-/// Angles along each axis of a table that is thinned evenly.
-const THINNED_ANGLES: usize = 13;
 /// Angles by which a curve between two angles of a table is drawn.
 const ANGLES_PER_INTERVAL: u32 = 16;
 /// Just above a gamma of 90 degrees.
@@ -332,61 +326,6 @@ pub(super) fn square_candela(luminaire: &mut Luminaire) -> bool {
     let candela = sample_nodes(table.c_deg(), table.gamma_deg(), |c, g| table.intensity(c, g).value().powi(2));
     luminaire.flux_scale *= luminaire.flux_scale;
     replace_nodes(luminaire, table.c_deg().to_vec(), table.gamma_deg().to_vec(), candela)
-}
-
-/// Thins a long table, so that reflected light takes less time: angles go at which the candela are straight, and only where too many
-/// are left, evenly spread ones.
-pub(super) fn thin(luminaire: &mut Luminaire) -> bool {
-    let table = &type_c_table(luminaire);
-    let (c, gamma) = (table.c_deg(), table.gamma_deg());
-    if c.len() * gamma.len() <= MAX_NODES {
-        return false;
-    }
-    let planes: Vec<&[f64]> = (0..c.len()).map(|k| table.plane(k)).collect();
-    let cones: Vec<Vec<f64>> = (0..gamma.len()).map(|k| planes.iter().map(|plane| plane[k]).collect()).collect();
-    let cones: Vec<&[f64]> = cones.iter().map(Vec::as_slice).collect();
-    let peak_cd = table.max_intensity().value();
-    let mut kept = [thin_angles(c), thin_angles(gamma)];
-    for share in THINNED_SHARES {
-        let bent = [bent_angles(c, &planes, share * peak_cd), bent_angles(gamma, &cones, share * peak_cd)];
-        if bent[0].len() * bent[1].len() <= MAX_NODES {
-            kept = bent;
-            break;
-        }
-    }
-    let [c_deg, gamma_deg] = kept;
-    let candela = sample_nodes(&c_deg, &gamma_deg, |c, g| table.intensity(c, g).value());
-    replace_nodes(luminaire, c_deg, gamma_deg, candela)
-}
-
-/// The angles between which every row of candela is straight to so many candela; `rows` has one row an angle.
-fn bent_angles(angles: &[f64], rows: &[&[f64]], within_cd: f64) -> Vec<f64> {
-    let last = angles.len() - 1;
-    let mut kept = vec![angles[0]];
-    let mut from = 0;
-    while from < last {
-        let mut to = from + 1;
-        while to < last && is_straight(angles, rows, from, to + 1, within_cd) {
-            to += 1;
-        }
-        kept.push(angles[to]);
-        from = to;
-    }
-    kept
-}
-
-fn is_straight(angles: &[f64], rows: &[&[f64]], from: usize, to: usize, within_cd: f64) -> bool {
-    (from + 1..to).all(|k| {
-        let part = (angles[k] - angles[from]) / (angles[to] - angles[from]);
-        let between = rows[from].iter().zip(rows[to]).map(|(a, b)| a + part * (b - a));
-        between.zip(rows[k]).all(|(straight, candela)| (straight - candela).abs() <= within_cd)
-    })
-}
-
-/// Selects a few evenly spread angles, with the first and the last.
-fn thin_angles(angles: &[f64]) -> Vec<f64> {
-    let (last, count) = (angles.len() - 1, angles.len().min(THINNED_ANGLES));
-    (0..count).map(|k| angles[(k * last).div_ceil((count - 1).max(1)).min(last)]).collect()
 }
 
 /// Samples candela at all nodes, plane by plane.

@@ -273,6 +273,16 @@ fn what_no_fault_does_is_left_unnamed() {
 }
 
 #[test]
+fn squared_lux_is_named_with_its_power() {
+    let tasks = BOTH.map(skew);
+    let named = causes(&tasks, &|m| m.right.iter().map(|r| r * r).collect());
+    assert!(
+        named.len() == 1 && named[0].what.starts_with("readings in lux are raised to the power of 2.0000"),
+        "{named:?}"
+    );
+}
+
+#[test]
 fn readings_that_are_rightly_the_same_everywhere_show_no_shape() {
     let furnace: Vec<Task> = known::tasks().into_iter().filter(|t| t.procedure == ProcedureId::Furnace).collect();
     let squared = causes(&furnace, &|m| m.right.iter().map(|r| r * r).collect());
