@@ -41,7 +41,7 @@ fn steps(page: &str) -> Vec<Step> {
                 let shown = block.iter().filter_map(|l| l.strip_prefix("$ ")).map(str::to_owned);
                 steps.extend(shown.map(|command| Step::Run(command, commands.next().unwrap_or_default())));
             }
-            Some(("yaml", name)) => steps.push(Step::Write(name.to_owned(), block.join("\n") + "\n")),
+            Some(("yaml" | "text", name)) => steps.push(Step::Write(name.to_owned(), block.join("\n") + "\n")),
             _ => (),
         }
     }

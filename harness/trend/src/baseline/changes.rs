@@ -134,7 +134,8 @@ pub struct MeterChange {
 impl fmt::Display for MeanShift {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (relative, uncertainty) = (100.0 * self.relative, 100.0 * self.uncertainty);
-        write!(f, "{relative:+.4} % ± {uncertainty:.4} % ({:+.1} u)", self.relative / self.uncertainty)
+        let in_u = super::review::in_uncertainties(self.relative / self.uncertainty);
+        write!(f, "{relative:+.4} % ± {uncertainty:.4} % ({in_u})")
     }
 }
 

@@ -136,12 +136,18 @@ fn write_change(
     }
     for m in change.meters.iter().sorted_by(|a, b| a.p_value.total_cmp(&b.p_value)).take(SHOWN_METERS) {
         let change = m.new - m.old;
-        let in_u = if m.uncertainty > 0.0 { format!("{:+.1} u", change / m.uncertainty) } else { "exact".to_owned() };
+        let in_u = if m.uncertainty > 0.0 { in_uncertainties(change / m.uncertainty) } else { "exact".to_owned() };
         let mark = if m.significant { "  <- changed" } else { "" };
         let (MeterChange { meter, old, new, .. }, unit) = (m, m.quantity.unit());
         writeln!(output, "  {meter:<16} old {old:.6} new {new:.6} {unit}, change {change:+.6}: {in_u}{mark}")?;
     }
     write_remaining(change.meters.len(), output)
+}
+
+/// A change in standard uncertainties, as far as the number means anything.
+pub(super) fn in_uncertainties(change: f64) -> String {
+    const MOST: f64 = 1000.0;
+    if change.abs() > MOST { format!("more than {MOST} u") } else { format!("{change:+.1} u") }
 }
 
 /// Writes how many meters are not shown.
