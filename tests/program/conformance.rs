@@ -101,6 +101,13 @@ fn faults_of_axes_tables_and_luminaires_are_named() {
 }
 
 #[test]
+fn meters_that_read_nothing_without_a_known_cause_are_listed_with_their_normals() {
+    let answer = examined(&[(LUX, "lux = 0.0 if 0.5 < meter[\"normal\"][0] < 0.9 else illuminance_lx(")]);
+    let line = answer.stdout.lines().find(|line| line.contains("0 is read at ")).unwrap_or_default();
+    assert!(line.contains("] (normal [0.") && line.contains("nothing that is known explains it"), "{}", answer.stdout);
+}
+
+#[test]
 fn readings_that_are_right_elsewhere_are_reported_with_their_meter() {
     let answers = "    return {\"answers\": [{\"job\": job[\"job\"], **answer(job)} for job in request[\"jobs\"]]}";
     let shifted = "    done = [answer(job) for job in request[\"jobs\"]]

@@ -237,7 +237,8 @@ impl Findings {
                 } else {
                     (Standing::Wrong, "nothing that is known explains it")
                 };
-                self.add(Topic::by_scene(procedure), standing, format!("{failures}, {}; {why}", worst(&all)));
+                let dark = dark(&all).map(|dark| format!("; {dark}")).unwrap_or_default();
+                self.add(Topic::by_scene(procedure), standing, format!("{failures}, {}; {why}{dark}", worst(&all)));
             }
             for cause in causes {
                 let topic = topic_of(cause, procedure);
@@ -365,6 +366,23 @@ fn worst(comparisons: &[&Comparison]) -> String {
         (None, Some(lux)) => format!("by {lux:+.3} lx at most where there should be none"),
         (None, None) => "which have no reading".to_owned(),
     }
+}
+
+/// More dark meters than this are counted instead of listed.
+const LISTED_METERS: usize = 3;
+
+/// Which meters read nothing where there is light, and where they face.
+fn dark(comparisons: &[&Comparison]) -> Option<String> {
+    let is_dark = |c: &&&Comparison| c.verdict == Verdict::Fail && c.value == Some(0.0);
+    let dark: Vec<&&Comparison> = comparisons.iter().filter(is_dark).collect();
+    let mut listed = vec![];
+    for c in dark.iter().take(LISTED_METERS) {
+        let [x, y, z] = c.normal.map(|n| (1e3 * n).round() / 1e3);
+        listed.push(format!("{} (normal [{x}, {y}, {z}])", c.meter));
+    }
+    let more = dark.len().saturating_sub(LISTED_METERS);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!listed.is_empty()).then(|| format!("0 is read at {}{more}", listed.join(", ")))
 }
 
 /// The value of largest magnitude among the failing comparisons.
