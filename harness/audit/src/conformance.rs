@@ -373,8 +373,7 @@ const LISTED_METERS: usize = 3;
 
 /// Which meters read nothing where there is light, and where they face.
 fn dark(comparisons: &[&Comparison]) -> Option<String> {
-    let is_dark = |c: &&&Comparison| c.verdict == Verdict::Fail && c.value == Some(0.0);
-    let dark: Vec<&&Comparison> = comparisons.iter().filter(is_dark).collect();
+    let dark = comparisons.iter().filter(|c| c.verdict == Verdict::Fail && c.value == Some(0.0)).collect::<Vec<_>>();
     let mut listed = vec![];
     for c in dark.iter().take(LISTED_METERS) {
         let [x, y, z] = c.normal.map(|n| (1e3 * n).round() / 1e3);

@@ -59,8 +59,8 @@ pub(crate) fn explain_undecided(
 /// The recordings that had too little time: where the clock cut one, where a point is short of the requested error, or
 /// where one is about there and no time was left.
 fn limited_by_time(comparisons: &[Comparison], recordings: &[Recording], budget: Budget) -> BTreeSet<ReadingKey> {
-    let is_spent = |r: &&Recording| r.work_s() >= SPENT_SHARE * budget.seconds;
-    let spent: BTreeSet<&ReadingKey> = recordings.iter().filter(is_spent).map(|r| &r.key).collect();
+    let spent = recordings.iter().filter(|r| r.work_s() >= SPENT_SHARE * budget.seconds);
+    let spent: BTreeSet<&ReadingKey> = spent.map(|r| &r.key).collect();
     let undecided = comparisons.iter().filter(|c| c.verdict == Verdict::Undecided);
     let short = undecided.filter(|c| match find_obstacle(c, budget) {
         Some(Obstacle::TimeLimit) => true,

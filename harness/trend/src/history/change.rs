@@ -413,7 +413,7 @@ mod tests {
     #[test]
     fn an_engine_that_repeats_exactly_changes_on_any_night_from_the_third_on_and_back() {
         for first in 2..7 {
-            let mut nights = vec![0.0; 16];
+            let mut nights = [0.0; 16];
             nights[first..12].fill(0.5);
             for seen in [first + 2, 16] {
                 let found = exact(&nights[..seen]);

@@ -138,14 +138,16 @@ fn a_table_without_interpolation_is_named_where_reflected_light_shows_it_too() {
     assert!(!found.is_empty() && found.iter().all(|c| c.what.contains("the nearest angle counts")), "{found:?}");
 }
 
+/// Angles with two more around the middle of each interval.
+fn with_steps(angles: &[f64]) -> Vec<f64> {
+    let middles = angles.windows(2).map(|pair| f64::midpoint(pair[0], pair[1]));
+    let steps = middles.flat_map(|middle| [middle - 5e-4, middle + 5e-4]);
+    angles.iter().copied().chain(steps).sorted_by(f64::total_cmp).collect()
+}
+
 /// Steps midway between the angles of a table, each side of a step a thousandth of a degree wide.
 fn take_nearest(luminaire: &mut Luminaire) {
     let table = luminaire.photometry.distribution.full_circle();
-    let with_steps = |angles: &[f64]| {
-        let middles = angles.windows(2).map(|pair| f64::midpoint(pair[0], pair[1]));
-        let steps = middles.flat_map(|middle| [middle - 5e-4, middle + 5e-4]);
-        angles.iter().copied().chain(steps).sorted_by(f64::total_cmp).collect_vec()
-    };
     let (c_deg, gamma_deg) = (with_steps(table.c_deg()), with_steps(table.gamma_deg()));
     let nodes = c_deg.iter().cartesian_product(&gamma_deg);
     let candela = nodes.map(|(c, g)| weighted(&table, *c, *g, f64::round)).collect();

@@ -26,8 +26,8 @@ const MIN_INTERVAL_LENGTH: f64 = 3.0;
 pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette, marks: Marks) -> Markup {
     // Ratings have no zero, and so no percent of it.
     let unit = group.comparisons.iter().find(|c| !c.quantity.has_zero()).map(|c| c.quantity.unit());
-    let is_drawn = |c: &&Comparison| drawn(c).is_some() && (unit.is_some() || is_relative(c));
-    let compared: Vec<&Comparison> = group.comparisons.iter().copied().filter(is_drawn).collect();
+    let mut compared: Vec<&Comparison> = group.comparisons.clone();
+    compared.retain(|c| drawn(c).is_some() && (unit.is_some() || is_relative(c)));
     let scale = scale(&compared);
     let mut y = 4.0;
     let mut blocks: Vec<Markup> = vec![];
