@@ -203,6 +203,12 @@ pub(crate) fn pool_scatters(ratios: &[(f64, f64)]) -> Option<(f64, f64)> {
     (chance.sf(difference / correction) > COMMON_SIZE_P).then_some((square.sqrt(), freedom))
 }
 
+/// Whether repeated readings are all the same, whatever the first one is, which stands last and had more samples.
+pub(crate) fn ignores_seed(readings: &[Estimate]) -> bool {
+    let Some((_, repeated)) = readings.split_last() else { return false };
+    repeated.len() > 1 && repeated.windows(2).all(|pair| pair[0].value == pair[1].value)
+}
+
 /// What readings with different seeds show of the tails of their distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tails {
@@ -220,7 +226,8 @@ impl Tails {
     /// It counts the meters with an outlier by F. E. Grubbs' test (Technometrics 11 (1969)), and those skewed to the bright
     /// side. The noise of a few samples that hold much of the light is skewed to that side.
     pub fn of(meters: &[Vec<Estimate>]) -> Self {
-        let judged: Vec<ReadingShape> = meters.iter().filter_map(|m| ReadingShape::from_readings(m)).collect();
+        let random = meters.iter().filter(|m| !ignores_seed(m));
+        let judged: Vec<ReadingShape> = random.filter_map(|m| ReadingShape::from_readings(m)).collect();
         let n = judged.len() as u64;
         let with_outlier = judged.iter().filter(|shape| shape.has_outlier).count() as u64;
         let skewed = judged.iter().filter(|shape| shape.is_skewed).count() as u64;

@@ -6,7 +6,9 @@ use std::iter::Sum;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::design_effect;
-use crate::scatter::{MeterScatter, PooledScatter, Tails, UNSTATED_FREEDOM, mean_value, pool_repeated, pool_scatters};
+use crate::scatter::{
+    MeterScatter, PooledScatter, Tails, UNSTATED_FREEDOM, ignores_seed, mean_value, pool_repeated, pool_scatters,
+};
 use luxproof_model::{ErrorFinding, Estimate, MeterId, ROUNDING, StatedErrors, Uncertainty};
 
 /// Stated errors have a heavy tail if their variation is less probable than this. The level is low because the chi-squared
@@ -191,8 +193,9 @@ pub fn of_sampled(meters: &[Vec<Estimate>], of_engine: &Variation) -> Option<Sta
     let variation = Variation::of(meters);
     let (varies, varies_beyond) = variation.with(of_engine);
     let steady = variation.steadier_than_stated().filter(|_| ratio >= ROUNDING);
+    let mut sampled = meters.iter().filter(|m| m.iter().any(|e| e.uncertainty.standard_error() > Some(0.0)));
     let finding = match ratio {
-        r if r < ROUNDING => Some(ErrorFinding::SameForEverySeed),
+        r if r < ROUNDING || sampled.all(|m| ignores_seed(m)) => Some(ErrorFinding::SameForEverySeed),
         // This precedes the heavy tail: samples of a heavy tail scatter by what they state, too.
         r if below < REPORTED_P && r < 1.0 / MIN_EXCESS_RATIO => Some(ErrorFinding::TooLarge),
         _ if varies_beyond && varies.is_some_and(|freedom| freedom < MIN_NORMAL_FREEDOM) => {
@@ -718,6 +721,22 @@ mod tests {
         let found = of_sheltered(&sheltered(&mut random, &mixed, false), Tails::Normal);
         assert!(found[0].at.values().filter(|scatter| **scatter < 0.003).count() == 23, "{found:?}");
         assert_eq!(found[0].degrees_of_freedom, 6.0);
+    }
+
+    #[test]
+    fn fewer_samples_of_the_same_stream_are_the_same_with_every_seed_and_no_heavy_tail() {
+        let mut random = Rng::with_seed(5);
+        let mut meters = vec![];
+        for _ in 0..40 {
+            let [fewer, whole] = [0.2, 0.1].map(|error| {
+                let value = 100.0 + error * normal(&mut random);
+                Estimate { value, uncertainty: Uncertainty::sampled(error, Some(15.0)) }
+            });
+            meters.push(vec![fewer, fewer, fewer, whole]);
+        }
+        assert_ne!(Tails::of(&meters), Tails::Heavy);
+        let found = of_sampled(&meters, &Variation::of(&meters)).unwrap();
+        assert_eq!(found.finding, Some(ErrorFinding::SameForEverySeed));
     }
 
     #[test]
