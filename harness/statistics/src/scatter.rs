@@ -203,7 +203,7 @@ pub(crate) fn pool_scatters(ratios: &[(f64, f64)]) -> Option<(f64, f64)> {
     (chance.sf(difference / correction) > COMMON_SIZE_P).then_some((square.sqrt(), freedom))
 }
 
-/// Whether repeated readings are all the same, whatever the first one is, which stands last and had more samples.
+/// Whether repeated readings are equal, whatever the first one is, which stands last and had more samples.
 pub(crate) fn ignores_seed(readings: &[Estimate]) -> bool {
     let Some((_, repeated)) = readings.split_last() else { return false };
     repeated.len() > 1 && repeated.windows(2).all(|pair| pair[0].value == pair[1].value)

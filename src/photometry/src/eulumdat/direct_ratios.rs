@@ -29,15 +29,15 @@ pub(super) fn direct_ratios(distribution: &LuminousIntensityDistribution) -> Opt
     let c_deg: Vec<f64> = planes.iter().map(|(middle, _)| *middle).collect();
     let gamma_deg: Vec<f64> = zones.iter().map(|(middle, _)| *middle).collect();
     let candela = full.intensities(&c_deg, &gamma_deg);
+    let sides: Vec<(f64, f64)> = c_deg.iter().map(|c| c.to_radians().sin_cos()).collect();
     let mut landed = [0.0; 10];
     for ((gamma, height), row) in zones.iter().zip(candela.chunks(c_deg.len())) {
         let (middle, half) = (gamma.to_radians(), 0.5 * height.to_radians());
-        let band = 2.0 * middle.sin() * half.sin();
-        for ((c, width), candela) in planes.iter().zip(row) {
-            let (sin, cos) = c.to_radians().sin_cos();
+        let (band, tan) = (2.0 * middle.sin() * half.sin(), middle.tan());
+        for (((_, width), (sin, cos)), candela) in planes.iter().zip(&sides).zip(row) {
             let lumens = candela * band * width.to_radians();
             for (sum, k) in landed.iter_mut().zip(ROOM_INDICES) {
-                let run = middle.tan() / (2.0 * k);
+                let run = tan / (2.0 * k);
                 *sum += lumens * (1.0 - run * cos.abs()).max(0.0) * (1.0 - run * sin.abs()).max(0.0);
             }
         }
