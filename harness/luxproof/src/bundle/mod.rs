@@ -78,7 +78,9 @@ pub enum BundleError {
     Name(PathBuf),
     #[error("{folder} holds files and no bundle, such as {file}: name another folder with --out")]
     Occupied { folder: String, file: String },
-    #[error("{0} is no bundle: it holds no SHA256SUMS")]
+    #[error(
+        "{0} is no bundle: it holds no SHA256SUMS, nor the study.yaml of a study; of a paper name the file of its printed tables"
+    )]
     NoBundle(String),
     #[error("{bundle} is not what was bundled:\n  {}", list(.faults))]
     Broken { bundle: String, faults: Vec<String> },
