@@ -420,7 +420,6 @@ procedures:
         for (right, wrong, word, line, column, help) in [
             ("size_m", "sise_m", "sise_m", 3, Some(3), Some("did you mean `size_m`?")),
             ("0.5", "1.5", "1.5", 4, Some(36), None),
-            ("0.5", "50 %", "50 %", 4, None, Some("write 50 % as 0.5")),
             (
                 "direct_illuminance",
                 "illuminance",
@@ -435,6 +434,14 @@ procedures:
             assert_eq!((error.line, error.help.as_deref()), (Some(line), help), "{error}");
             assert!(error.message.contains(word) && column.is_none_or(|c| error.column == Some(c)), "{error}");
         }
+    }
+
+    #[test]
+    fn shares_in_percent_are_answered_with_the_number_to_write() {
+        let text = MINIMAL.replace("walls: 0.5, ceiling: 0.8", "walls: 50 %, ceiling: 80%");
+        let faults = Source::new("spec.yaml".into(), text).parse_whole::<Spec>().unwrap_err();
+        let help: Vec<Option<&str>> = faults.all().iter().map(|fault| fault.help.as_deref()).collect();
+        assert_eq!(help, [Some("write 50 % as 0.5"), Some("write 80 % as 0.8")]);
     }
 
     #[test]
