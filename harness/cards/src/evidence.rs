@@ -229,7 +229,7 @@ impl<'a> ReportIndex<'a> {
             return Some(Outcome::NotRun { reason: "there is no independent reference".to_owned() });
         }
         let measurement = self.measurement(recording, &judged);
-        // Too few samples show no fault: their errors are hardly known.
+        // Too few samples show no fault: their errors are too uncertain.
         if let Some(part) = recording.cut_to.filter(|_| measurement.has_fault()) {
             return Some(cut_short(part));
         }

@@ -133,7 +133,8 @@ impl Judge<'_> {
                 }
                 for reference in references {
                     let comparison = self.comparison(task, (recording, k), largest, Some(reference));
-                    if comparison.reference.as_ref().is_some_and(|r| r.value == 0.0) && comparison.allowed() == 0.0 {
+                    let is_dark = comparison.reference.as_ref().is_some_and(|r| r.value == 0.0);
+                    if is_dark && comparison.value.is_some() && comparison.allowed() == 0.0 {
                         without_tolerance.push((comparisons.len(), k));
                     }
                     comparisons.push(comparison);

@@ -193,6 +193,17 @@ fn verdict_on_darkness(value: f64, bound: f64) -> Verdict {
 }
 
 #[test]
+fn a_missing_reading_of_darkness_keeps_its_reason_without_a_tolerance() {
+    let none = luxproof_spec::ToleranceOverride::default();
+    let overrides = std::collections::BTreeMap::from([(luxproof_model::ProcedureId::IndirectIlluminance, none)]);
+    let judge = Judge { overrides: &overrides, ..built_in() };
+    let exact = recording("simulator", &[Estimate::exact(100.0), Estimate::exact(0.0)]);
+    let subject = recording("radiance", &[Estimate::exact(100.0)]);
+    let missing = &judge.compare_one(&task(2), &subject, &[&exact, &subject])[1];
+    assert_eq!((missing.verdict, missing.diagnosis.as_deref()), (Verdict::Missing, Some("no reading")));
+}
+
+#[test]
 fn darkness_passes_up_to_rounding_where_a_spec_gives_no_absolute_tolerance() {
     assert_eq!(verdict_on_darkness(0.0, 7e-12), Verdict::Pass);
     assert_eq!(verdict_on_darkness(1e-9, 0.0), Verdict::Fail);
