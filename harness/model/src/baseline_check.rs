@@ -73,3 +73,48 @@ impl BaselineCheck {
         Some(format!("the run differs from its baseline {}: {counts} (first {place}: {details})", self.file))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ProcedureId;
+
+    fn line(engine: &str, state: &str, is_as_accepted: bool, details: &[&str], instrument: &[&str]) -> BaselineLine {
+        BaselineLine {
+            key: ReadingKey::new("room", ProcedureId::DirectIlluminance, engine),
+            state: state.to_owned(),
+            is_as_accepted,
+            details: details.iter().map(|text| (*text).to_owned()).collect(),
+            instrument: instrument.iter().map(|text| (*text).to_owned()).collect(),
+        }
+    }
+
+    fn check(entries: Vec<BaselineLine>) -> BaselineCheck {
+        BaselineCheck { file: "baseline.json".to_owned(), entries }
+    }
+
+    #[test]
+    fn a_check_is_as_accepted_if_every_entry_is_and_else_names_the_first_departure() {
+        let version = "version: 1.0 before, 1.1 now";
+        let quiet = line("mine", "unchanged", true, &[], &[version]);
+        let moved =
+            line("radiance", "SHIFTED", false, &["by 3 %", "at desk[0]", "and at desk[1]"], &["version: 6 before"]);
+        assert_eq!(moved.lines().collect_vec(), ["by 3 %", "at desk[0]", "and at desk[1]", "version: 6 before"]);
+        let sound = check(vec![quiet.clone(), quiet.clone()]);
+        assert!(sound.is_as_accepted() && sound.reason().is_none() && sound.differences().next().is_none());
+        assert_eq!(sound.counts(), "2 unchanged");
+        assert_eq!(sound.differences_within_noise(), [format!("mine {version}")]);
+        let mixed = check(vec![quiet.clone(), moved.clone(), quiet]);
+        assert!(!mixed.is_as_accepted());
+        assert_eq!(mixed.differences().collect_vec(), [&moved]);
+        assert_eq!(mixed.counts(), "2 unchanged, 1 SHIFTED");
+        // What differs beyond the noise is no difference within it.
+        assert_eq!(mixed.differences_within_noise(), [format!("mine {version}")]);
+        let reason = mixed.reason().unwrap();
+        assert_eq!(
+            reason,
+            "the run differs from its baseline baseline.json: 2 unchanged, 1 SHIFTED (first room direct_illuminance radiance: by 3 %; at desk[0])"
+        );
+        assert_eq!(check(vec![]).counts(), "nothing to compare");
+    }
+}

@@ -31,3 +31,14 @@ impl Basis {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn every_basis_has_its_name() {
+        let all = [Basis::ClosedForm, Basis::Simulator, Basis::Iesna, Basis::Published, Basis::Engine];
+        assert_eq!(all.map(Basis::name), ["closed form", "simulator", "IESNA", "published", "engine"]);
+        assert!(all.is_sorted());
+    }
+}

@@ -57,3 +57,21 @@ impl fmt::Display for Bias {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ProcedureId;
+
+    #[test]
+    fn a_bias_is_written_in_percent_with_its_interval_probability_and_scatter() {
+        let key = ReadingKey::new("room", ProcedureId::DirectIlluminance, "radiance");
+        let scatter = Some(Scatter { ratio: 1.254, p_value: Some(0.4) });
+        let (mean, low, high, p_value) = (0.0123, -0.01, 0.0346, Some(0.031));
+        let bias = Bias { key, basis: Basis::Simulator, readings: 5, mean, low, high, p_value, fails: false, scatter };
+        let text = "+1.230 % [-1.000, +3.460], p = 0.03; scatter 1.25 of what is stated, p = 0.40";
+        assert_eq!(bias.to_string(), text);
+        let plain = Bias { p_value: None, scatter: None, ..bias };
+        assert_eq!(plain.to_string(), "+1.230 % [-1.000, +3.460], range of 5");
+    }
+}

@@ -99,3 +99,33 @@ impl Comparison {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::comparison;
+
+    #[test]
+    fn a_reference_has_the_standard_uncertainty_of_what_is_stated() {
+        let bounded = Reference::of(100.0, &Uncertainty::Bound(0.3), Basis::Iesna, "a formula".to_owned());
+        assert!((bounded.uncertainty - 0.3 / 3f64.sqrt()).abs() < 1e-15);
+        let sampled = Reference::of(100.0, &Uncertainty::sampled(0.2, Some(7.0)), Basis::Engine, "it".to_owned());
+        assert_eq!((sampled.value, sampled.uncertainty, sampled.degrees_of_freedom), (100.0, 0.2, Some(7.0)));
+        assert_eq!((sampled.basis, sampled.source.as_str(), sampled.coverage_factor), (Basis::Engine, "it", None));
+    }
+
+    #[test]
+    fn a_deviation_is_normalized_by_what_is_allowed() {
+        // 1 % of 100 lx is more than .5 lx.
+        let c = comparison();
+        assert_eq!((c.basis(), c.basis_name(), c.allowed()), (Some(Basis::Simulator), "simulator", 1.0));
+        assert_eq!(c.normalized_error(), Some(2.0));
+        let equal = Comparison { deviation: Some(0.0), tolerance: Tolerance::default(), ..comparison() };
+        assert_eq!(equal.normalized_error(), Some(0.0));
+        let none_allowed = Comparison { tolerance: Tolerance::default(), ..comparison() };
+        assert_eq!(none_allowed.normalized_error(), None);
+        assert_eq!(Comparison { deviation: None, ..comparison() }.normalized_error(), None);
+        let without = Comparison { reference: None, ..comparison() };
+        assert_eq!((without.basis(), without.basis_name(), without.allowed()), (None, "none", 0.0));
+    }
+}

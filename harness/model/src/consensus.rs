@@ -59,3 +59,15 @@ pub struct Witness {
     /// The probability that its code is the outlier.
     pub probability: f64,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn a_group_names_its_members_and_what_they_share() {
+        let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect();
+        let tied = Group { witnesses: words(&["a", "b"]), share: words(&["tables", "lookup"]) };
+        assert_eq!(tied.to_string(), "a = b (tables, lookup)");
+        assert_eq!(Group { witnesses: words(&["a"]), share: vec![] }.to_string(), "a");
+    }
+}

@@ -54,4 +54,10 @@ mod tests {
             assert_eq!(day(wrong), Err(NoDay(wrong.to_owned())));
         }
     }
+
+    #[test]
+    fn a_day_is_written_as_it_is_read() {
+        assert_eq!(Day::try_from("2027-06-30".to_owned()).unwrap().to_string(), "2027-06-30");
+        assert_eq!(Day::of_timestamp("2027-6-30"), Err(NoDay("2027-6-30".to_owned())));
+    }
 }

@@ -74,3 +74,17 @@ pub struct ErrorBudget {
     #[serde(skip)]
     pub counted: Vec<Component>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn a_bound_is_a_rectangular_component_of_its_half_width_over_the_root_of_three() {
+        // GUM 4.3.7: u^2 = a^2 / 3.
+        let bounded = Component::within(Source::Rounding, 0.6);
+        assert!((bounded.uncertainty.powi(2) - 0.36 / 3.0).abs() < 1e-15, "{bounded:?}");
+        assert_eq!((bounded.source, bounded.shape), (Source::Rounding, Shape::Rectangular));
+        let normal = Component::normal(Source::MonteCarlo, 0.2, Some(7.0));
+        assert_eq!((normal.uncertainty, normal.shape, normal.degrees_of_freedom), (0.2, Shape::Normal, Some(7.0)));
+    }
+}

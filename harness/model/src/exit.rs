@@ -116,11 +116,63 @@ impl Exit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::{comparison, recording};
+    use crate::{Basis, Bias, Comparison, ErrorFinding, ReadingKey, Recording, Scope, Skip, StatedErrors};
 
     #[test]
     fn the_worst_exit_wins() {
         let worse_and_worse = [Exit::Passed, Exit::Undecided, Exit::Failed, Exit::Engine, Exit::Usage];
         assert!(worse_and_worse.is_sorted());
         assert_eq!(worse_and_worse.map(Exit::code), [0, 4, 1, 3, 2]);
+    }
+
+    #[test]
+    fn every_verdict_has_its_exit() {
+        for (verdict, exit) in [
+            (Verdict::Pass, Exit::Passed),
+            (Verdict::NotJudged, Exit::Passed),
+            (Verdict::KnownDeviation, Exit::Passed),
+            (Verdict::Undecided, Exit::Undecided),
+            (Verdict::Fail, Exit::Failed),
+            (Verdict::UnexpectedPass, Exit::Failed),
+            (Verdict::Missing, Exit::Failed),
+        ] {
+            assert_eq!(Exit::of(verdict), exit, "{verdict:?}");
+        }
+    }
+
+    #[test]
+    fn a_summary_counts_each_verdict_and_what_was_skipped() {
+        let counts = [
+            (Verdict::Pass, 2),
+            (Verdict::Fail, 3),
+            (Verdict::Undecided, 4),
+            (Verdict::KnownDeviation, 5),
+            (Verdict::UnexpectedPass, 6),
+            (Verdict::Missing, 7),
+            (Verdict::NotJudged, 8),
+        ];
+        let mut report = Report::default();
+        for (verdict, count) in counts {
+            report.comparisons.extend(vec![Comparison { verdict, ..comparison() }; count]);
+        }
+        let key = comparison().key;
+        for scope in [Scope::Procedure, Scope::Engine, Scope::Meter, Scope::LightPath] {
+            report.skips.push(Skip::new(key.clone(), scope, "absent"));
+        }
+        let found = Summary::of(&report);
+        let text = "2 passed, 3 failed, 4 undecided, 5 known deviations, 6 unexpected passes, 7 missing, 8 not judged, 2 skipped";
+        assert_eq!(found.to_string(), text);
+        // A claim that repetition refutes, and a bias of another engine than those that fail.
+        let scatters = StatedErrors::from_finding(ErrorFinding::Scatters);
+        report.recordings = vec![Recording { stated_errors: vec![scatters], ..recording() }];
+        let key = ReadingKey { engine: "mine".into(), ..key };
+        let (mean, low, high) = (0.05, 0.04, 0.06);
+        let basis = Basis::Simulator;
+        report.bias =
+            vec![Bias { key, basis, readings: 9, mean, low, high, p_value: None, fails: true, scatter: None }];
+        let found = Summary::of(&report);
+        assert_eq!((found.failed_biases, found.failed_claims), (1, 1));
+        assert_eq!(found.to_string(), format!("{text}, 1 failed by bias, 1 claims failed"));
     }
 }

@@ -40,3 +40,17 @@ impl ForeignPath {
         &self.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn a_foreign_path_is_written_and_read_as_it_stands() {
+        let path = ForeignPath::from(PathBuf::from("a/b.yaml"));
+        assert_eq!((path.shown().as_str(), path.unchecked()), ("a/b.yaml", Path::new("a/b.yaml")));
+        assert_eq!(path.in_folder(Path::new("/bundle")).unchecked(), Path::new("/bundle/a/b.yaml"));
+        let text = serde_json::to_string(&path).unwrap();
+        assert_eq!(text, "\"a/b.yaml\"");
+        assert_eq!(serde_json::from_str::<ForeignPath>(&text).unwrap(), path);
+    }
+}

@@ -209,4 +209,32 @@ mod tests {
         let text = "glare".parse::<ProcedureId>().unwrap_err().to_string();
         assert!(text.contains("`glare`") && text.contains("direct_illuminance"), "{text}");
     }
+
+    #[test]
+    fn a_key_is_of_its_case_and_procedure_alone() {
+        let key = ReadingKey::new("room", ProcedureId::DirectIlluminance, "radiance");
+        assert!(key.is_of("room", ProcedureId::DirectIlluminance));
+        assert!(!key.is_of("hall", ProcedureId::DirectIlluminance));
+        assert!(!key.is_of("room", ProcedureId::TotalIlluminance));
+        assert_eq!(key.to_string(), "radiance direct_illuminance of room");
+        assert_eq!(ProcedureId::ALL.last().map(|p| p.name()), Some("unified_glare_rating"));
+    }
+
+    #[test]
+    fn the_name_of_an_engine_may_have_a_release() {
+        let named = EngineName::from("radiance@1.3.1");
+        assert_eq!((named.family(), named.as_str(), &*named), ("radiance", "radiance@1.3.1", "radiance@1.3.1"));
+        assert_eq!(named.release().map(|r| r.to_string()).as_deref(), Some("1.3.1"));
+        assert_eq!((EngineName::SIMULATOR.release(), EngineName::from("a@..").release()), (None, None));
+        assert_eq!((family("povray"), family("povray@3.7")), ("povray", "povray"));
+        assert!(named == *"radiance@1.3.1" && named != *"radiance");
+        assert_eq!((named.to_string().as_str(), Borrow::<str>::borrow(&named)), ("radiance@1.3.1", "radiance@1.3.1"));
+    }
+
+    #[test]
+    fn the_name_of_a_meter_begins_with_that_of_its_set() {
+        let meter = MeterId::new("desk[left]", 12);
+        assert_eq!((meter.to_string().as_str(), meter.set_name()), ("desk[left][12]", "desk[left]"));
+        assert_eq!(MeterId("alone".to_owned()).set_name(), "alone");
+    }
 }

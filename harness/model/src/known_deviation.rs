@@ -186,3 +186,110 @@ pub enum LawBreach {
     Crash,
     Hang,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::comparison;
+    use crate::{Reference, Uncertainty};
+
+    /// An entry about everything of Radiance's direct light.
+    fn entry() -> KnownDeviation {
+        KnownDeviation {
+            engine: "radiance".into(),
+            procedure: ProcedureId::DirectIlluminance,
+            basis: None,
+            case: None,
+            content: vec![],
+            model: None,
+            meter: None,
+            gamma_deg: None,
+            expected: 0.02,
+            uncertainty: 0.001,
+            cause: "a cache".to_owned(),
+            kind: DeviationKind::Fault,
+            source: "measured".to_owned(),
+            owner: None,
+            issue: None,
+            expires: None,
+        }
+    }
+
+    fn glob(text: &str) -> Glob {
+        Glob::new(text).unwrap()
+    }
+
+    #[test]
+    fn an_entry_is_about_what_all_of_its_fields_name() {
+        let (c, plain) = (comparison(), entry());
+        assert!(plain.is_about(&c, "ab"));
+        for named in [
+            KnownDeviation { basis: Some(Basis::Simulator), ..entry() },
+            KnownDeviation { case: Some(glob("suite/*")), ..entry() },
+            // The name of a spec means all its cases.
+            KnownDeviation { case: Some(glob("suite")), ..entry() },
+            KnownDeviation { content: vec!["cd".to_owned(), "ab".to_owned()], ..entry() },
+            KnownDeviation { model: Some("point".to_owned()), ..entry() },
+        ] {
+            assert!(named.is_about(&c, "ab"), "{named:?}");
+        }
+        for other in [
+            KnownDeviation { engine: "mitsuba".into(), ..entry() },
+            KnownDeviation { procedure: ProcedureId::TotalIlluminance, ..entry() },
+            KnownDeviation { basis: Some(Basis::Published), ..entry() },
+            KnownDeviation { case: Some(glob("room")), ..entry() },
+            KnownDeviation { case: Some(glob("suit")), ..entry() },
+            KnownDeviation { content: vec!["cd".to_owned()], ..entry() },
+            KnownDeviation { model: Some("area".to_owned()), ..entry() },
+        ] {
+            assert!(!other.is_about(&c, "ab"), "{other:?}");
+        }
+        let without = Comparison { reference: None, ..comparison() };
+        assert!(!plain.is_about(&without, "ab"));
+        let source = "a paper".to_owned();
+        let printed = Reference::of(100.0, &Uncertainty::Exact, Basis::Published, source);
+        assert!(plain.is_about(&Comparison { reference: Some(printed), ..c }, "ab"));
+    }
+
+    #[test]
+    fn an_entry_is_at_its_meters_and_within_its_angles() {
+        let c = Comparison { gamma_deg: Some(60.0), ..comparison() };
+        assert!(entry().is_at(&c) && KnownDeviation { meter: Some(glob("desk[*]")), ..entry() }.is_at(&c));
+        assert!(!KnownDeviation { meter: Some(glob("desk[4]")), ..entry() }.is_at(&c));
+        for (range, is_at) in [([60.0, 90.0], true), ([0.0, 60.0], true), ([0.0, 59.9], false), ([60.1, 90.0], false)] {
+            let of_range = KnownDeviation { gamma_deg: Some(range), meter: Some(glob("desk[*]")), ..entry() };
+            assert_eq!(of_range.is_at(&c), is_at, "{range:?}");
+            // A meter without an angle is within none.
+            assert!(!of_range.is_at(&comparison()));
+            assert!(!KnownDeviation { meter: Some(glob("wall[*]")), ..of_range }.is_at(&c));
+        }
+    }
+
+    #[test]
+    fn an_entry_counts_up_to_its_last_day() {
+        let day = Day::try_from("2027-06-30".to_owned()).unwrap();
+        assert!(!entry().is_expired(&day));
+        for (last, is_expired) in [("2027-06-29", true), ("2027-06-30", false), ("2027-07-01", false)] {
+            let expires = Some(Day::try_from(last.to_owned()).unwrap());
+            assert_eq!(KnownDeviation { expires, ..entry() }.is_expired(&day), is_expired, "{last}");
+        }
+    }
+
+    #[test]
+    fn an_entry_reads_back_as_written_and_names_its_cause_issue_and_owner() {
+        assert_eq!(entry().summary(), "a cache");
+        let (owner, issue) = (Some("us".to_owned()), Some("RAD-41".to_owned()));
+        let owned =
+            KnownDeviation { owner, issue, meter: Some(glob("desk[?]")), kind: DeviationKind::Limit, ..entry() };
+        assert_eq!(owned.summary(), "a cache (RAD-41, us)");
+        let text = serde_json::to_string(&owned).unwrap();
+        // Brackets of a meter's name are written as they are, and the usual kind is not written.
+        assert!(text.contains(r#""meter":"desk[?]""#) && text.contains(r#""kind":"limit""#), "{text}");
+        assert_eq!(serde_json::from_str::<KnownDeviation>(&text).unwrap(), owned);
+        let plain = serde_json::to_string(&entry()).unwrap();
+        assert!(!plain.contains("kind"), "{plain}");
+        let error = serde_json::from_str::<Glob>("[1]").unwrap_err().to_string();
+        assert!(error.contains("expected a name, `*` and `?` for parts of it"), "{error}");
+        assert!(serde_json::from_str::<Glob>("\"a***\"").unwrap_err().to_string().contains("`a***` is no pattern"));
+    }
+}

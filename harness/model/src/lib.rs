@@ -9,6 +9,8 @@ mod curve;
 mod day;
 mod error_budget;
 mod exit;
+#[cfg(test)]
+mod fixtures;
 mod floor_plan;
 mod foreign_path;
 mod hidden_variant;
@@ -350,6 +352,7 @@ impl Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::{comparison, recording};
 
     #[test]
     fn standard_error_is_that_of_the_mean() {
@@ -373,5 +376,123 @@ mod tests {
             assert_eq!(rounded(found.uncertainty.standard_error().unwrap()), error);
             assert_eq!(found.uncertainty.degrees_of_freedom(), Some(4.0));
         }
+    }
+
+    #[test]
+    fn every_quantity_has_its_unit_and_a_rating_has_no_zero() {
+        let all = [
+            (Quantity::Illuminance, "lx", true),
+            (Quantity::LuminousIntensity, "cd", true),
+            (Quantity::Luminance, "cd/m²", true),
+            (Quantity::GlareRating, "UGR", false),
+        ];
+        for (quantity, unit, has_zero) in all {
+            assert_eq!((quantity.unit(), quantity.has_zero()), (unit, has_zero));
+        }
+    }
+
+    fn sampled(value: f64, error: f64) -> Estimate {
+        Estimate { value, uncertainty: Uncertainty::sampled(error, Some(7.0)) }
+    }
+
+    /// Which of the estimates are marked as not seen.
+    fn unseen(all: &[Estimate]) -> Vec<bool> {
+        all.iter().map(|e| e.uncertainty == Uncertainty::NotSeen).collect()
+    }
+
+    #[test]
+    fn what_no_sample_met_is_not_seen_where_samples_met_others() {
+        let mut all = [sampled(5.0, 0.1), sampled(0.0, 0.0), sampled(3.0, 0.0), sampled(0.0, 0.1), Estimate::DARK];
+        Estimate::mark_unseen(&mut all);
+        assert_eq!(unseen(&all), [false, true, false, false, false]);
+        // Where nothing is lit, or what is lit is not sampled, darkness may be true.
+        for first in [sampled(0.0, 0.1), sampled(-1.0, 0.1), Estimate::exact(5.0)] {
+            let mut all = [first, sampled(0.0, 0.0)];
+            Estimate::mark_unseen(&mut all);
+            assert_eq!(unseen(&all), [false, false], "{first:?}");
+        }
+    }
+
+    #[test]
+    fn samples_that_agree_where_those_of_others_do_not_are_not_seen() {
+        // Rounding is up to a millionth of the value.
+        let bounded = Estimate {
+            value: 5.0,
+            uncertainty: Uncertainty::StandardError { value: 0.0, degrees_of_freedom: None, bound: 0.1 },
+        };
+        let same = [sampled(5.0, 4e-6), sampled(-5.0, 4e-6), sampled(5.0, 0.0), bounded, Estimate::exact(5.0)];
+        let mut all = [&[sampled(5.0, 6e-6)][..], &same].concat();
+        Estimate::mark_agreeing(&mut all);
+        assert_eq!(unseen(&all), [false, true, true, true, false, false]);
+        let mut all = same;
+        Estimate::mark_agreeing(&mut all);
+        assert_eq!(unseen(&all), [false; 5]);
+        // An error that is no number shows no scatter.
+        let mut all = [sampled(5.0, f64::NAN), sampled(5.0, 0.0)];
+        Estimate::mark_agreeing(&mut all);
+        assert_eq!(unseen(&all), [false; 2]);
+    }
+
+    #[test]
+    fn errors_of_one_run_add_up_and_those_of_two_add_in_quadrature() {
+        let (three, four) = (sampled(10.0, 3.0), sampled(20.0, 4.0));
+        let together = Estimate::of_one_run(&[2.0, -1.0], &[three, four]);
+        assert_eq!((together.value, together.uncertainty.standard_error()), (0.0, Some(10.0)));
+        let apart = three.plus(&four);
+        assert_eq!((apart.value, apart.uncertainty.standard_error()), (30.0, Some(5.0)));
+        let halved = four.times(-0.5);
+        assert_eq!((halved.value, halved.uncertainty.standard_error()), (-10.0, Some(2.0)));
+        assert_eq!(Estimate::exact(2.0), Estimate { value: 2.0, uncertainty: Uncertainty::Exact });
+    }
+
+    #[test]
+    fn a_declared_error_explains_a_deviation_within_it_and_the_margin_of_the_verdict() {
+        let budget = ErrorBudget {
+            components: vec![],
+            combined: 0.25,
+            degrees_of_freedom: None,
+            coverage_factor: 2.0,
+            expanded: 0.5,
+            counted: vec![],
+        };
+        let c = Comparison { budget: Some(budget), ..comparison() };
+        let coarse =
+            Recording { approximation: Some("takes points".to_owned()), declared_error: Some(0.03), ..recording() };
+        // 3 % of 100 lx, the tolerance of 1 lx and the half width of .5 lx.
+        for (deviation, is_explained) in [(4.49, true), (-4.49, true), (4.5, true), (4.51, false), (-4.51, false)] {
+            let c = Comparison { deviation: Some(deviation), ..c.clone() };
+            assert_eq!(coarse.declared(&c).is_some(), is_explained, "{deviation}");
+            let report = Report { recordings: vec![coarse.clone()], ..Report::default() };
+            assert_eq!(report.declared(&c), coarse.declared(&c));
+        }
+        assert_eq!(coarse.declared(&c), Some("takes points"));
+        assert_eq!(Recording { declared_error: None, ..coarse.clone() }.declared(&c), None);
+        let other = Comparison { key: ReadingKey::new("other", c.key.procedure, "radiance"), ..c };
+        assert_eq!(Report { recordings: vec![coarse], ..Report::default() }.declared(&other), None);
+    }
+
+    #[test]
+    fn a_recording_gives_its_readings_by_meter_also_where_some_are_missing() {
+        let mut found = recording();
+        for (k, value) in [(0, 1.0), (2, 3.0), (3, 4.0)] {
+            let (meter, quantity) = (MeterId::new("desk", k), Quantity::Illuminance);
+            found.readings.push(Reading { meter, quantity, value, uncertainty: Uncertainty::Exact });
+        }
+        let values: Vec<Option<f64>> =
+            (0..5).map(|k| found.reading(k, &MeterId::new("desk", k)).map(|r| r.value)).collect();
+        assert_eq!(values, [Some(1.0), None, Some(3.0), Some(4.0), None]);
+        // A meter stands at its place or further ahead, never behind it.
+        assert!(found.reading(0, &MeterId::new("desk", 2)).is_none());
+        assert!(found.reading(2, &MeterId::new("desk", 3)).is_some());
+        assert_eq!(Recording { wall_s: 9.0, ..recording() }.work_s(), 9.0);
+        assert_eq!(Recording { wall_s: 9.0, work_s: Some(7.0), ..recording() }.work_s(), 7.0);
+    }
+
+    #[test]
+    fn a_recording_states_a_heavy_tail_by_its_findings() {
+        let [heavy, small] = [ErrorFinding::HeavyTail, ErrorFinding::TooSmall].map(StatedErrors::from_finding);
+        assert!(!recording().states_heavy_tail());
+        assert!(!Recording { stated_errors: vec![small.clone()], ..recording() }.states_heavy_tail());
+        assert!(Recording { stated_errors: vec![small, heavy], ..recording() }.states_heavy_tail());
     }
 }

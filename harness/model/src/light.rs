@@ -90,4 +90,13 @@ mod tests {
             assert!(Light::try_from(wrong.to_owned()).is_err(), "{wrong}");
         }
     }
+
+    #[test]
+    fn direct_light_has_no_bounces() {
+        assert_eq!(Light(Transport::Direct).bounces(), None);
+        assert_eq!(Light(Transport::Indirect(Bounces::AtMost(7))).bounces(), Some(Bounces::AtMost(7)));
+        assert_eq!(Light(Transport::Total(Bounces::Converged)).bounces(), Some(Bounces::Converged));
+        assert_eq!(Light(Transport::Total(Bounces::AtMost(7))).to_string(), "total, 7 bounces");
+        assert_eq!(String::from(Light(Transport::Indirect(Bounces::Converged))), "indirect, all bounces");
+    }
 }

@@ -143,4 +143,49 @@ mod tests {
         assert_eq!(all.names(), "p1, q0 and 2 more");
         assert_eq!(all.nearest.unwrap().distance_m, 1.0);
     }
+
+    #[test]
+    fn five_times_the_opening_is_far_enough() {
+        let near = panel("p", 2.499);
+        assert_eq!(near.too_near().map(|place| place.name.as_str()), Some("desk[5]"));
+        assert_eq!(panel("p", 2.5).reason(), "desk[5] is 2.50 m away, 5.00 times its size, not below 5");
+        let alone = LuminaireModelChoice { nearest: None, is_automatic: false, ..panel("p", 1.0) };
+        assert_eq!(alone.to_string(), "area (by spec) for p: no point or lit surface is near");
+        let bare = LuminaireModelChoice { largest_dimension_m: 0.0, ..panel("p", 1.0) };
+        assert_eq!(bare.reason(), "the file has no opening");
+        let sizes = near.nearest.unwrap().in_sizes(0.5);
+        assert_eq!(sizes, "desk[5] is 2.50 m = 5.00 opening sizes (0.5 m) away");
+    }
+
+    #[test]
+    fn choices_have_the_same_model_where_all_but_names_and_places_are_equal() {
+        let first = panel("p", 2.0);
+        assert!(first.has_same_model(&panel("q", 1.0)));
+        for other in [
+            LuminaireModelChoice { model: "point".into(), ..panel("p", 2.0) },
+            LuminaireModelChoice { is_automatic: false, ..panel("p", 2.0) },
+            LuminaireModelChoice { largest_dimension_m: 0.6, ..panel("p", 2.0) },
+            panel("p", 3.0),
+        ] {
+            assert!(!first.has_same_model(&other) && !other.has_same_model(&first), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn few_luminaires_are_all_named_and_a_place_replaces_none() {
+        let mut all = LuminaireModelChoice { nearest: None, ..panel("p1", 1.0) };
+        assert_eq!(all.names(), "p1");
+        all.join(LuminaireModelChoice { nearest: None, ..panel("p2", 1.0) });
+        assert_eq!((all.names().as_str(), &all.nearest), ("p1, p2", &None));
+        all.join(panel("p3", 7.0));
+        assert_eq!(
+            (all.names().as_str(), all.nearest.as_ref().map(|p| p.distance_m)),
+            ("p1, p2 and 1 more", Some(7.0))
+        );
+        // Of two at one distance the first stays.
+        let mut other = panel("p4", 7.0);
+        other.nearest.as_mut().unwrap().name = "wall".into();
+        all.join(other);
+        assert_eq!(all.nearest.unwrap().name, "desk[5]");
+    }
 }

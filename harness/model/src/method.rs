@@ -84,4 +84,15 @@ mod tests {
         assert_eq!(effort.mirrored(), expected);
         assert!(Effort::default().mirrored().is_empty());
     }
+
+    #[test]
+    fn settings_are_words_by_name() {
+        let mut method = Method::from([("preset", "audit")]);
+        method.insert("samples".to_owned(), 32.to_string());
+        assert_eq!(method.get("samples").map(String::as_str), Some("32"));
+        assert_eq!(method, Method::from_iter([("samples", "32"), ("preset", "audit")]));
+        let mut effort = Effort::from([("blocks", 8)]);
+        effort.remove("blocks");
+        assert!(effort.is_empty());
+    }
 }

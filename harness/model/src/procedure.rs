@@ -166,3 +166,31 @@ impl ProcedureId {
         self as usize >= Self::ALL.len()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn every_procedure_has_its_words_and_its_quantity() {
+        let (intensity, glare) = (ProcedureId::LuminousIntensity, ProcedureId::UnifiedGlareRating);
+        assert_eq!((intensity.title(), intensity.short()), ("Luminous intensity", "Intensity"));
+        assert!(glare.meaning().starts_with("Unified glare rating (CIE 117)"));
+        assert_eq!(
+            (ProcedureId::Point.title(), ProcedureId::Point.short()),
+            ("Calibration: point", "Calibration: point")
+        );
+        assert_eq!(ProcedureId::Shadow.meaning(), "light that a box hides, and light that passes it");
+        for (procedure, quantity) in [
+            (intensity, Quantity::LuminousIntensity),
+            (ProcedureId::SphericalIlluminance, Quantity::Illuminance),
+            (ProcedureId::Luminance, Quantity::Luminance),
+            (ProcedureId::OpeningLuminance, Quantity::Luminance),
+            (glare, Quantity::GlareRating),
+            (ProcedureId::Reflectances, Quantity::Illuminance),
+        ] {
+            assert_eq!(procedure.quantity(), quantity, "{procedure}");
+        }
+        assert!(!glare.is_calibration() && ProcedureId::Point.is_calibration());
+        assert!(ProcedureId::ALL.iter().all(|procedure| !procedure.is_calibration()));
+    }
+}

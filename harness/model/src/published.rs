@@ -130,4 +130,58 @@ mod tests {
         let source = "Simulation of Luminaires in Radiance: Verification Method, Table 2, lum1: Flat polygon, of light";
         assert_eq!(published_column(source), "lum1");
     }
+
+    #[test]
+    fn a_printed_cell_has_the_interval_of_its_last_digit() {
+        // Half a unit of the last digit of 12.30 is .005.
+        for (printed, decimals, half_width) in
+            [("12.30", 0, 0.005), ("12.30", 1, 0.005), ("12.3", 2, 0.005), ("12", 0, 0.5)]
+        {
+            let found = printed_cell(printed, decimals, 0.5).unwrap();
+            let Uncertainty::Bound(bound) = found.uncertainty else { panic!("{found:?}") };
+            assert!((bound / half_width - 1.0).abs() < 1e-12, "{printed}: {bound}");
+        }
+        assert_eq!(printed_cell(" 7.5 ", 0, 0.5).map(|e| e.value), Some(7.5));
+        assert_eq!([printed_cell("n.a.", 0, 0.5), printed_cell("inf", 0, 0.5)], [None, None]);
+        assert_eq!(["1", "1.", "1.25 ", "0.500"].map(decimals_of), [0, 0, 2, 3]);
+        assert_eq!(published_column("Title, Table 2, lum1"), "lum1");
+    }
+
+    #[test]
+    fn a_table_is_the_same_by_title_name_and_procedure() {
+        let row = PublishedRow {
+            meter: MeterId::new("desk", 0),
+            place: "0, 0".to_owned(),
+            row: 0,
+            cells: BTreeMap::from([("lum1".to_owned(), "12.3".to_owned())]),
+        };
+        let table = PublishedTable {
+            title: "Simulation".to_owned(),
+            name: "Table 2".to_owned(),
+            procedure: ProcedureId::DirectIlluminance,
+            quantity: Quantity::Illuminance,
+            cases: vec![],
+            bounces: None,
+            units_in_last_digit: 1.0,
+            flux: None,
+            columns: vec![],
+            rows: vec![row.clone()],
+            misfits: vec![],
+        };
+        assert!(table.is_the_same(&PublishedTable { rows: vec![], ..table.clone() }));
+        assert!(!table.is_the_same(&PublishedTable { title: "Another".to_owned(), ..table.clone() }));
+        assert!(!table.is_the_same(&PublishedTable { name: "Table 3".to_owned(), ..table.clone() }));
+        assert!(!table.is_the_same(&PublishedTable { procedure: ProcedureId::Luminance, ..table.clone() }));
+        assert_eq!(table.printed(&row, "lum1"), Some(Estimate { value: 12.3, uncertainty: Uncertainty::Bound(0.1) }));
+        assert_eq!(table.printed(&row, "lum2"), None);
+    }
+
+    #[test]
+    fn a_misfit_names_what_contradicts_it() {
+        let (column, printed) = ("lum1".to_owned(), "12.3".to_owned());
+        let by = vec!["lum2".to_owned(), "the law".to_owned()];
+        let misfit = Misfit { row: 3, column, printed, expected: 13.257, half_width: 0.051, by };
+        let text = "the printed 12.3 does not fit its own table: by lum2 and the law 13.26 ± 0.05";
+        assert_eq!(misfit.to_string(), text);
+    }
 }

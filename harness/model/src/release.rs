@@ -109,4 +109,14 @@ mod tests {
         turned.sort();
         assert_eq!(turned, releases);
     }
+
+    #[test]
+    fn a_release_may_have_24_letters() {
+        let longest = "1".repeat(MAX_LETTERS);
+        assert_eq!(longest.parse::<Release>().unwrap().as_str(), longest);
+        assert_eq!((longest + "1").parse::<Release>(), Err(NoRelease));
+        let [one, other] = ["1.0", "1.00"].map(|text| text.parse::<Release>().unwrap());
+        // Of equal numbers the text decides.
+        assert_eq!((one.cmp(&other), one.partial_cmp(&one)), (Ordering::Less, Some(Ordering::Equal)));
+    }
 }

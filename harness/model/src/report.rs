@@ -274,3 +274,221 @@ impl Report {
         self.comparisons.len().max(self.readings.len()) > MAX_ON_ONE_PAGE
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{comparison, engine, recording};
+    use crate::{Basis, ErrorFinding, Quantity, Scope, Status, Uncertainty};
+
+    fn case(name: &str) -> CaseRecord {
+        CaseRecord {
+            name: name.to_owned(),
+            spec: SpecRecord::default(),
+            policy: None,
+            decision_rule: String::new(),
+            is_calibration: false,
+            hidden_variant: None,
+            has_bodies: false,
+            luminaire_models: vec![],
+            plan: None,
+        }
+    }
+
+    /// A policy that requires these engines.
+    fn policy(file: &str, required: &[&str]) -> PolicyRecord {
+        let required_engines = required.iter().map(|name| EngineName::from(*name)).collect();
+        PolicyRecord { file: file.to_owned(), sha256: String::new(), profile: None, required_engines }
+    }
+
+    /// The case with a policy that requires these engines.
+    fn of_policy(required: &[&str]) -> CaseRecord {
+        CaseRecord { policy: Some(policy("p", required)), ..case("suite/room") }
+    }
+
+    /// A run of Radiance in one case, with one comparison that passes.
+    fn report() -> Report {
+        Report {
+            engines: vec![engine("radiance", Status::Ran)],
+            cases: vec![case("suite/room")],
+            recordings: vec![recording()],
+            comparisons: vec![Comparison { verdict: Verdict::Pass, ..comparison() }],
+            ..Report::default()
+        }
+    }
+
+    #[test]
+    fn the_worst_of_engines_comparisons_biases_claims_and_baseline_is_the_exit() {
+        assert_eq!((report().worst(), report().exit()), (Exit::Passed, Exit::Passed));
+        let undecided = Comparison { verdict: Verdict::Undecided, ..comparison() };
+        assert_eq!(Report { comparisons: vec![undecided.clone()], ..report() }.exit(), Exit::Undecided);
+        let failed = Report { comparisons: vec![undecided.clone(), comparison()], ..report() };
+        assert_eq!(failed.exit(), Exit::Failed);
+        let crashed = Report { engines: vec![engine("radiance", Status::Failed)], ..failed };
+        assert_eq!(crashed.exit(), Exit::Engine);
+        // What a baseline does not accept fails a run, and does not hide a worse error.
+        let entries = vec![];
+        let equal = Some(BaselineCheck { file: "b.json".to_owned(), entries });
+        assert_eq!(Report { baseline: equal, ..report() }.exit(), Exit::Passed);
+        let line = crate::BaselineLine {
+            key: comparison().key,
+            state: "SHIFTED".to_owned(),
+            is_as_accepted: false,
+            details: vec![],
+            instrument: vec![],
+        };
+        let shifted = Some(BaselineCheck { file: "b.json".to_owned(), entries: vec![line] });
+        assert_eq!(Report { baseline: shifted.clone(), ..report() }.exit(), Exit::Failed);
+        let both = Report { baseline: shifted.clone(), comparisons: vec![undecided], ..report() };
+        assert_eq!(both.exit(), Exit::Failed);
+        assert_eq!(Report { baseline: shifted, ..crashed }.exit(), Exit::Engine);
+    }
+
+    /// A bias of Radiance against the simulator that fails.
+    fn bias() -> Bias {
+        Bias {
+            key: comparison().key,
+            basis: Basis::Simulator,
+            readings: 9,
+            mean: 0.05,
+            low: 0.04,
+            high: 0.06,
+            p_value: None,
+            fails: true,
+            scatter: None,
+        }
+    }
+
+    #[test]
+    fn a_bias_fails_a_run_where_no_reading_of_the_same_comparison_does() {
+        let alone = Report { bias: vec![bias()], ..report() };
+        assert_eq!((alone.failed_biases().count(), alone.worst()), (1, Exit::Failed));
+        let allowed = Report { bias: vec![Bias { fails: false, ..bias() }], ..report() };
+        assert_eq!((allowed.failed_biases().count(), allowed.worst()), (0, Exit::Passed));
+        let with_failure = Report { comparisons: vec![comparison()], ..alone.clone() };
+        assert_eq!(with_failure.failed_biases().count(), 0);
+        // A failure of another key or against another kind of reference is another one.
+        let mut of_other_case = comparison();
+        of_other_case.key.case = "suite/hall".to_owned();
+        assert_eq!(Report { comparisons: vec![of_other_case], ..alone.clone() }.failed_biases().count(), 1);
+        let mut of_paper = comparison();
+        of_paper.reference.as_mut().unwrap().basis = Basis::Published;
+        assert_eq!(Report { comparisons: vec![of_paper], ..alone }.failed_biases().count(), 1);
+    }
+
+    #[test]
+    fn a_refuted_claim_fails_a_run() {
+        let [large, refuted] = [ErrorFinding::TooLarge, ErrorFinding::Refuted].map(StatedErrors::from_finding);
+        let stated_errors = vec![large, refuted.clone()];
+        let found = Report { recordings: vec![Recording { stated_errors, ..recording() }], ..report() };
+        assert_eq!(found.failed_claims().map(|(_, stated)| stated).collect::<Vec<_>>(), [&refuted]);
+        assert_eq!((found.worst(), report().failed_claims().count()), (Exit::Failed, 0));
+    }
+
+    #[test]
+    fn a_run_lacks_the_engines_that_a_policy_requires_and_that_read_nothing_in_its_cases() {
+        let whole = Report { cases: vec![of_policy(&["radiance"])], ..report() };
+        assert!(whole.lacking().is_empty() && whole.exit() == Exit::Passed);
+        let asks_more = Report { cases: vec![of_policy(&["radiance", "mitsuba"])], ..report() };
+        let (named, missing) = (policy("p", &["radiance", "mitsuba"]), EngineName::from("mitsuba"));
+        assert_eq!(asks_more.lacking(), [(&named, &missing)]);
+        assert_eq!(asks_more.exit(), Exit::Engine);
+        // Neither what failed nor what was recorded nor what another case read counts.
+        for recording in [
+            Recording { failure: Some("a crash".to_owned()), ..recording() },
+            Recording { role: Role::Recorded, ..recording() },
+            Recording { key: ReadingKey { case: "other".to_owned(), ..recording().key }, ..recording() },
+        ] {
+            let without = Report { recordings: vec![recording], ..whole.clone() };
+            assert_eq!(without.lacking().len(), 1, "{:?}", without.recordings);
+        }
+        // A calibration scene does not count, and a run of such scenes alone lacks nothing.
+        let calibration = CaseRecord { is_calibration: true, ..of_policy(&["radiance"]) };
+        let beside = CaseRecord { name: "suite/hall".to_owned(), ..of_policy(&["radiance"]) };
+        let without = Report { cases: vec![calibration.clone(), beside], ..report() };
+        assert_eq!(without.lacking().len(), 1);
+        let alone = Report { cases: vec![calibration], recordings: vec![], ..report() };
+        assert!(alone.lacking().is_empty());
+        // Each policy is asked by its own cases, and counted once.
+        let other = CaseRecord { policy: Some(policy("q", &["radiance"])), ..case("suite/hall") };
+        let two = Report { cases: vec![of_policy(&["radiance"]), of_policy(&["radiance"]), other], ..report() };
+        assert_eq!(two.policies().len(), 2);
+        assert_eq!(two.lacking(), [(&policy("q", &["radiance"]), &EngineName::from("radiance"))]);
+    }
+
+    #[test]
+    fn a_run_without_readings_of_a_renderer_has_audited_nothing() {
+        assert!(report().has_audited());
+        let mut of_reference = engine("simulator", Status::Ran);
+        of_reference.role = Role::Reference;
+        let recordings = vec![Recording { role: Role::Reference, ..recording() }];
+        let references = Report { engines: vec![of_reference], recordings: recordings.clone(), ..report() };
+        assert!(references.has_audited());
+        for recordings in [
+            vec![],
+            recordings,
+            vec![Recording { failure: Some("a crash".to_owned()), ..recording() }],
+            vec![Recording { key: ReadingKey { case: "other".to_owned(), ..recording().key }, ..recording() }],
+        ] {
+            let nothing = Report { recordings, ..report() };
+            assert!(!nothing.has_audited() && nothing.exit() == Exit::Engine, "{:?}", nothing.recordings);
+        }
+        // Calibration scenes count where specs request nothing else.
+        let calibration = CaseRecord { is_calibration: true, ..case("suite/room") };
+        assert!(Report { cases: vec![calibration.clone()], ..report() }.has_audited());
+        let with_other = Report { cases: vec![calibration, case("suite/hall")], ..report() };
+        assert!(!with_other.has_audited());
+    }
+
+    #[test]
+    fn a_suite_has_several_cases_of_specs() {
+        let calibration = CaseRecord { is_calibration: true, ..case("point") };
+        let one = Report { cases: vec![case("suite/room"), calibration], ..report() };
+        assert_eq!((one.asked(), one.is_suite(), one.of_suite("suite/room", ": ").as_str()), (1, false, ""));
+        let two = Report { cases: vec![case("suite/room"), case("suite/hall")], ..report() };
+        assert_eq!((two.asked(), two.is_suite()), (2, true));
+        assert_eq!(two.of_suite("suite/room", ": "), "suite/room: ");
+    }
+
+    #[test]
+    fn a_report_has_its_procedures_and_its_readings_by_key_and_meter() {
+        let mut found = report();
+        let skipped = ReadingKey::new("suite/room", ProcedureId::TotalIlluminance, "radiance");
+        found.skips.push(Skip::new(skipped.clone(), Scope::Procedure, "absent"));
+        let both = BTreeSet::from([ProcedureId::DirectIlluminance, ProcedureId::TotalIlluminance]);
+        assert_eq!(found.procedures(), both);
+        let key = comparison().key;
+        for (k, value) in [(0, 1.0), (1, 2.0)] {
+            let (meter, quantity, uncertainty) = (MeterId::new("desk", k), Quantity::Illuminance, Uncertainty::Exact);
+            let reading = Reading { meter, quantity, value, uncertainty };
+            found.readings.push(ReadingRecord { key: key.clone(), model: "point".to_owned(), reading });
+        }
+        let second = MeterId::new("desk", 1);
+        assert_eq!(found.reading(&key, &second).map(|r| r.value), Some(2.0));
+        assert!(found.reading(&skipped, &second).is_none());
+        assert!(found.reading(&key, &MeterId::new("desk", 2)).is_none());
+    }
+
+    #[test]
+    fn more_than_ten_thousand_comparisons_or_readings_are_long() {
+        let reading = Reading {
+            meter: MeterId::new("desk", 0),
+            quantity: Quantity::Illuminance,
+            value: 1.0,
+            uncertainty: Uncertainty::Exact,
+        };
+        let record = ReadingRecord { key: comparison().key, model: String::new(), reading };
+        for (count, is_long) in [(MAX_ON_ONE_PAGE, false), (MAX_ON_ONE_PAGE + 1, true)] {
+            assert_eq!(Report { comparisons: vec![comparison(); count], ..report() }.is_long(), is_long);
+            assert_eq!(Report { readings: vec![record.clone(); count], ..report() }.is_long(), is_long);
+        }
+    }
+
+    #[test]
+    fn a_lint_names_its_line_and_its_help_where_it_has_them() {
+        let lint = LintRecord { file: "a.yaml".to_owned(), line: None, message: "is odd".to_owned(), help: None };
+        assert_eq!(lint.to_string(), "a.yaml: is odd");
+        let placed = LintRecord { line: Some(7), help: Some("change it".to_owned()), ..lint };
+        assert_eq!(placed.to_string(), "a.yaml:7: is odd; change it");
+    }
+}

@@ -83,4 +83,28 @@ mod tests {
             "luxproof run a.yaml --engines 'radiance,mitsuba' --filter 'a b' --seed 7 --sampling accurate --no-skips";
         assert_eq!(request.command(&["a.yaml".to_owned()]), command);
     }
+
+    #[test]
+    fn a_plain_request_is_a_plain_command() {
+        let plain = Request { seed: 1, ..Request::default() };
+        assert_eq!(
+            plain.command(&["a.yaml".to_owned(), "b c.yaml".to_owned()]),
+            "luxproof run a.yaml 'b c.yaml' --seed 1"
+        );
+        let full = Request {
+            procedures: vec![ProcedureId::DirectIlluminance, ProcedureId::TotalIlluminance],
+            policy: Some(std::path::PathBuf::from("p.yaml").into()),
+            profile: Some("ci".to_owned()),
+            tolerance_class: Some(ToleranceClass::Design),
+            no_calibration: true,
+            fail_fast: true,
+            relative_error: Some(0.01),
+            ..plain
+        };
+        assert_eq!(
+            full.command(&[]),
+            "luxproof run --procedures 'direct_illuminance,total_illuminance' --seed 1 --policy p.yaml --profile ci \
+             --tolerance-class design --no-calibration --fail-fast # until a relative error of 0.01"
+        );
+    }
 }

@@ -37,3 +37,28 @@ impl ProcedureClaim {
         self.failed + self.undecided + self.missing == 0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn a_claim_is_sound_without_failed_undecided_and_missing_readings() {
+        let claim = ProcedureClaim {
+            procedure: ProcedureId::DirectIlluminance,
+            readings: 9,
+            within: Some(0.01),
+            failed: 0,
+            undecided: 0,
+            known_deviations: 3,
+            missing: 0,
+            bias: None,
+        };
+        assert!(claim.is_sound());
+        for (failed, undecided, missing) in
+            [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (2, 1, 1), (1, 1, 2)]
+        {
+            let unsound = ProcedureClaim { failed, undecided, missing, ..claim.clone() };
+            assert!(!unsound.is_sound(), "{unsound:?}");
+        }
+    }
+}

@@ -77,3 +77,63 @@ impl<'de, T, L: Deserialize<'de>, M: Deserialize<'de>> Visitor<'de> for Shapes<T
         self.take(ShapedValue::Keys(keys), Unexpected::Map)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::de::Deserializer;
+
+    /// What was found, in words.
+    #[derive(Debug, PartialEq)]
+    struct Description(String);
+
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Pair {
+        a: u32,
+    }
+
+    impl<'de> Deserialize<'de> for Description {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            deserializer.deserialize_any(Shapes { expected: "a shape", read: describe })
+        }
+    }
+
+    #[allow(clippy::needless_pass_by_value, reason = "the form of all visitors of shapes")]
+    fn describe(found: ShapedValue<'_, Vec<u32>, Pair>) -> ShapeResult<Description> {
+        let number = found.number();
+        let text = match found {
+            ShapedValue::Word("no") => return None,
+            ShapedValue::Word("wrong") => return Some(Err("it is wrong".to_owned())),
+            ShapedValue::Word(word) => format!("word {word}"),
+            ShapedValue::Count(n) => format!("count {n}"),
+            ShapedValue::Number(x) => format!("number {x}"),
+            ShapedValue::List(list) => format!("list {list:?}"),
+            ShapedValue::Keys(Pair { a }) => format!("keys {a}"),
+        };
+        Some(Ok(Description(number.map_or(text.clone(), |number| format!("{text} = {number:?}")))))
+    }
+
+    #[test]
+    fn a_value_is_read_in_the_shape_that_it_has() {
+        for (text, expected) in [
+            ("\"x\"", "word x"),
+            ("7", "count 7 = 7.0"),
+            ("-7", "number -7 = -7.0"),
+            ("2.5", "number 2.5 = 2.5"),
+            ("[1, 2]", "list [1, 2]"),
+            ("{\"a\": 3}", "keys 3"),
+        ] {
+            assert_eq!(serde_json::from_str::<Description>(text).unwrap(), Description(expected.to_owned()));
+        }
+        for (text, says) in [
+            ("\"no\"", "invalid type: string \"no\", expected a shape"),
+            ("\"wrong\"", "it is wrong"),
+            ("true", "expected a shape"),
+            ("[\"x\"]", "expected u32"),
+        ] {
+            let error = serde_json::from_str::<Description>(text).unwrap_err().to_string();
+            assert!(error.contains(says), "{text}: {error}");
+        }
+    }
+}

@@ -79,3 +79,29 @@ impl Scope {
 
 /// The name for all engines in skips that concern every engine.
 pub const EVERYONE: EngineName = EngineName::new("all");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ProcedureId;
+
+    #[test]
+    fn a_skip_has_its_cause_and_its_saving() {
+        let key = ReadingKey::new("room", ProcedureId::DirectIlluminance, "radiance");
+        let plain = Skip::new(key, Scope::Meter, "by symmetry");
+        assert_eq!((plain.saved.as_deref(), plain.cause), (None, SkipCause::Other));
+        let saving = plain.clone().saving("4 of 12 points");
+        assert_eq!((saving.saved.as_deref(), saving.reason.as_str()), (Some("4 of 12 points"), "by symmetry"));
+        let absent = plain.clone().because(SkipCause::Absent);
+        assert_eq!((absent.cause, &absent.key), (SkipCause::Absent, &plain.key));
+        // The usual cause is not written.
+        let [plain, absent] = [plain, absent].map(|skip| serde_json::to_string(&skip).unwrap());
+        assert!(!plain.contains("cause") && absent.contains(r#""cause":"absent""#), "{plain} {absent}");
+    }
+
+    #[test]
+    fn meters_and_light_paths_have_readings_that_follow_from_others() {
+        let all = [Scope::Engine, Scope::Procedure, Scope::Meter, Scope::LightPath];
+        assert_eq!(all.map(Scope::leaves_no_reading), [true, true, false, false]);
+    }
+}

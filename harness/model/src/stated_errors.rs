@@ -204,3 +204,80 @@ impl fmt::Display for StatedErrors {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn repetition_refutes_what_right_errors_do_in_one_of_a_thousand_runs() {
+        for (finding, p_value, is_failed) in [
+            (ErrorFinding::Scatters, None, true),
+            (ErrorFinding::Refuted, None, true),
+            // On both sides, one in a thousand above is two in a thousand.
+            (ErrorFinding::TooSmall, Some(0.0019), true),
+            (ErrorFinding::TooSmall, Some(0.002), false),
+            (ErrorFinding::TooSmall, Some(0.0021), false),
+            (ErrorFinding::TooSmall, None, false),
+            (ErrorFinding::TooLarge, Some(1e-9), false),
+            (ErrorFinding::HeavyTail, Some(1e-9), false),
+        ] {
+            let found = StatedErrors { p_value, ..StatedErrors::from_finding(finding) };
+            assert_eq!(found.is_failed_claim(), is_failed, "{finding:?} {p_value:?}");
+        }
+    }
+
+    fn at(meters: &[(&str, f64)]) -> BTreeMap<MeterId, f64> {
+        meters.iter().map(|(meter, error)| (MeterId((*meter).to_owned()), *error)).collect()
+    }
+
+    #[test]
+    fn a_finding_at_meters_names_one_or_counts_them() {
+        assert_eq!(StatedErrors::from_finding_at(ErrorFinding::TooLarge, BTreeMap::new()), None);
+        let one = at(&[("desk[0]", 0.01)]);
+        let two = at(&[("desk[0]", 0.01), ("desk[1]", 0.02)]);
+        for (finding, begins) in [
+            (ErrorFinding::TooLarge, "its standard errors {} are far too large: its readings"),
+            (ErrorFinding::Scatters, "it states an error of zero {} with every seed"),
+            (ErrorFinding::Refuted, "the bounds that it states {} do not hold"),
+            (ErrorFinding::BeyondTolerance, "the bounds that it states {} are beyond the tolerance"),
+        ] {
+            for (meters, place) in [(&one, "at desk[0]"), (&two, "at 2 meters (desk[0] first)")] {
+                let found = StatedErrors::from_finding_at(finding, meters.clone()).unwrap();
+                assert_eq!((&found.at, found.finding, found.design_effect), (meters, Some(finding), 1.0));
+                let text = found.to_string();
+                assert!(text.starts_with(&begins.replace("{}", place)), "{text}");
+            }
+        }
+        let wide = StatedErrors::from_finding_at(ErrorFinding::TooLarge, two.clone()).unwrap();
+        assert!(wide.to_string().contains("scatter by at most 2.00e-2 there"), "{wide}");
+        let none = StatedErrors { finding: None, ..wide };
+        assert!(none.to_string().starts_with("verdicts at 2 meters (desk[0] first) go by"), "{none}");
+    }
+
+    #[test]
+    fn each_finding_has_its_words_and_its_number() {
+        let plain = StatedErrors { degrees_of_freedom: 12.0, ..StatedErrors::from_finding(ErrorFinding::TooSmall) };
+        let small = StatedErrors { ratio: Some(9999.0), ..plain.clone() };
+        assert!(small.to_string().starts_with("its standard errors are 9999.0 times too small"), "{small}");
+        assert!(small.to_string().contains("(12 degrees of freedom)"), "{small}");
+        let rounding = StatedErrors { ratio: Some(1e4), ..plain.clone() };
+        assert!(rounding.to_string().starts_with("its standard errors are 1e4 times too small"), "{rounding}");
+        let large = StatedErrors { ratio: Some(0.2), finding: Some(ErrorFinding::TooLarge), ..plain.clone() };
+        assert!(large.to_string().starts_with("its standard errors are 5.0 times too large"), "{large}");
+        let none = StatedErrors { ratio: Some(1.125), finding: None, ..plain.clone() };
+        assert!(none.to_string().starts_with("readings of other seeds scatter by 1.12 of what it states"), "{none}");
+        let heavy = StatedErrors {
+            finding: Some(ErrorFinding::HeavyTail),
+            observed_degrees_of_freedom: Some(1.5),
+            ..plain.clone()
+        };
+        assert!(heavy.to_string().contains("vary from seed to seed as those of 1.5 degrees of freedom"), "{heavy}");
+        let portion = StatedErrors { largest_portion: Some(0.1), ..heavy };
+        assert!(portion.to_string().contains("one seed reads far from all others"), "{portion}");
+        let claim = StatedErrors { finding: Some(ErrorFinding::Scatters), claim_scatter: Some(0.0123), ..plain };
+        let text = claim.to_string();
+        assert!(text.starts_with("it claims readings without any scatter") && text.contains("1.23e-2"), "{text}");
+        let first = StatedErrors { only_first_differs: true, ..claim };
+        assert!(first.to_string().starts_with("asked again, each job by itself"), "{first}");
+    }
+}

@@ -85,3 +85,38 @@ impl StatisticsAgreement {
         [&mut self.mean, &mut self.minimum].into_iter().chain(quotients.into_iter().flatten())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Uncertainty;
+
+    fn figure(value: f64, deviation: f64) -> FigureAgreement {
+        let reference = Estimate { value, uncertainty: Uncertainty::Exact };
+        FigureAgreement { reference, deviation, expanded: 0.0, allowed: 1.0, verdict: Verdict::Pass, p_value: 1.0 }
+    }
+
+    #[test]
+    fn a_figure_has_a_relative_deviation_unless_the_reference_is_zero() {
+        assert_eq!(figure(50.0, -2.0).relative(), Some(-0.04));
+        assert_eq!([figure(0.0, 2.0).relative(), figure(0.0, 0.0).relative()], [None, None]);
+    }
+
+    #[test]
+    fn figures_are_listed_with_their_names_and_quotients_where_there_are_any() {
+        let mut all = StatisticsAgreement {
+            basis: Basis::Simulator,
+            mean: figure(1.0, 0.1),
+            minimum: figure(2.0, 0.2),
+            uniformity: Some(figure(3.0, 0.3)),
+            diversity: Some(figure(4.0, 0.4)),
+        };
+        let found: Vec<(&str, f64)> = all.figures().map(|(name, figure)| (name, figure.deviation)).collect();
+        assert_eq!(found, [("mean", 0.1), ("minimum", 0.2), ("uniformity", 0.3), ("diversity", 0.4)]);
+        all.figures_mut().for_each(|figure| figure.deviation *= 2.0);
+        let found: Vec<f64> = all.figures().map(|(_, figure)| figure.deviation).collect();
+        assert_eq!(found, [0.2, 0.4, 0.6, 0.8]);
+        all.uniformity = None;
+        assert_eq!(all.figures().map(|(name, _)| name).collect::<Vec<_>>(), ["mean", "minimum", "diversity"]);
+    }
+}

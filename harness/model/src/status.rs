@@ -139,3 +139,54 @@ impl FailureKind {
         !matches!(self, Self::Interrupted | Self::TimeUp | Self::Unread)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::engine;
+
+    fn because(status: Status, reason: &str) -> EngineStatus {
+        EngineStatus { reason: Some(reason.to_owned()), ..engine("radiance", status) }
+    }
+
+    #[test]
+    fn of_several_cases_the_gravest_status_counts_and_times_add_up() {
+        let by_weight = [Status::Skipped, Status::Absent, Status::Ran, Status::Failed];
+        for (k, one) in by_weight.into_iter().enumerate() {
+            for (n, other) in by_weight.into_iter().enumerate().filter(|(n, _)| *n != k) {
+                let mut all = because(one, "one");
+                all.join(EngineStatus { wall_s: 4.0, ..because(other, "other") });
+                let (status, reason) = if n > k { (other, "other") } else { (one, "one") };
+                assert_eq!((all.status, all.reason.as_deref(), all.wall_s), (status, Some(reason), 5.0));
+            }
+        }
+        // Of two failures both reasons are named; otherwise the first stays.
+        let mut all = because(Status::Failed, "a crash");
+        all.join(because(Status::Failed, "a hang"));
+        assert_eq!(all.reason.as_deref(), Some("a crash; a hang"));
+        let mut all = because(Status::Skipped, "one");
+        all.join(because(Status::Skipped, "other"));
+        assert_eq!(all.reason.as_deref(), Some("one"));
+    }
+
+    #[test]
+    fn an_engine_that_failed_or_is_required_and_absent_is_an_error() {
+        for (status, is_required, exit) in [
+            (Status::Failed, false, Exit::Engine),
+            (Status::Absent, true, Exit::Engine),
+            (Status::Absent, false, Exit::Passed),
+            (Status::Ran, true, Exit::Passed),
+            (Status::Skipped, true, Exit::Passed),
+        ] {
+            assert_eq!(EngineStatus { is_required, ..engine("radiance", status) }.exit(), exit, "{status:?}");
+        }
+    }
+
+    #[test]
+    fn references_are_not_judged_and_an_interruption_is_no_answer() {
+        assert_eq!([Role::Reference, Role::Renderer, Role::Recorded].map(Role::is_judged), [false, true, true]);
+        let silent = [FailureKind::Interrupted, FailureKind::TimeUp, FailureKind::Unread];
+        assert!(silent.iter().all(|kind| !kind.is_an_answer()));
+        assert!(FailureKind::Declined.is_an_answer() && FailureKind::Hang.is_an_answer());
+    }
+}

@@ -55,3 +55,18 @@ pub enum ToleranceClass {
     /// Estimates
     Survey,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn the_larger_of_both_parts_is_allowed_and_the_smaller_of_two_tolerances_is_narrower() {
+        let tolerance = Tolerance { relative: 0.02, absolute: 0.5 };
+        for (reference, allowed) in [(100.0, 2.0), (-100.0, 2.0), (25.0, 0.5), (10.0, 0.5), (0.0, 0.5)] {
+            assert!((tolerance.around(reference) - allowed).abs() < 1e-15, "{reference}");
+        }
+        let other = Tolerance { relative: 0.01, absolute: 0.7 };
+        let narrower = Tolerance { relative: 0.01, absolute: 0.5 };
+        assert_eq!((tolerance.narrowed(other), other.narrowed(tolerance)), (narrower, narrower));
+    }
+}

@@ -28,3 +28,17 @@ impl fmt::Display for Tool {
         write!(f, " ({short}{changes})")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn a_version_has_the_first_digits_of_its_commit() {
+        let plain = Tool { version: "0.1.0".to_owned(), ..Tool::default() };
+        assert_eq!(plain.to_string(), "0.1.0");
+        let built = Tool { commit: Some("1a2b3c4d5e6f7a8b".to_owned()), dirty: Some(false), ..plain };
+        assert_eq!(built.to_string(), "0.1.0 (1a2b3c4d5e6f)");
+        assert_eq!(Tool { dirty: Some(true), ..built.clone() }.to_string(), "0.1.0 (1a2b3c4d5e6f, with changes)");
+        assert_eq!(Tool { dirty: None, ..built }.to_string(), "0.1.0 (1a2b3c4d5e6f)");
+    }
+}

@@ -312,4 +312,143 @@ mod tests {
         let both = Uncertainty::of_stages([(1.0, unseen), (3.0, SAMPLED)]);
         assert!((both.standard() - 3.0 * 0.75_f64.sqrt()).abs() < 1e-15, "{both:?}");
     }
+
+    const BOUNDED: Uncertainty = Uncertainty::StandardError { value: 3.0, degrees_of_freedom: Some(7.0), bound: 0.6 };
+    const ALL: [Uncertainty; 6] =
+        [Uncertainty::Unstated, Uncertainty::Exact, Uncertainty::NotSeen, Uncertainty::Bound(0.6), SAMPLED, BOUNDED];
+
+    #[test]
+    fn each_kind_states_what_it_has() {
+        assert_eq!(ALL.map(|u| u.standard_error()), [None, None, None, None, Some(3.0), Some(3.0)]);
+        assert_eq!(ALL.map(|u| u.degrees_of_freedom()), [None, None, None, None, Some(7.0), Some(7.0)]);
+        assert_eq!(ALL.map(|u| u.bound()), [0.0, 0.0, 0.0, 0.6, 0.0, 0.6]);
+        assert_eq!(ALL.map(|u| u.is_sampled()), [false, false, true, false, true, true]);
+        assert!(!Uncertainty::sampled(0.0, None).is_sampled() && !Uncertainty::sampled(-1.0, None).is_sampled());
+        // GUM 4.3.7 and 5.1.2: 9 + .36 / 3.
+        let squares = [0.0, 0.0, 0.0, 0.12, 9.0, 9.12];
+        for (stated, square) in ALL.into_iter().zip(squares) {
+            assert!((stated.standard().powi(2) - square).abs() < 1e-12, "{stated:?}");
+        }
+    }
+
+    #[test]
+    fn a_factor_scales_errors_and_bounds_and_a_further_bound_adds_up() {
+        let scaled = BOUNDED.times(-2.0);
+        assert_eq!((scaled.standard_error(), scaled.bound(), scaled.degrees_of_freedom()), (Some(6.0), 1.2, Some(7.0)));
+        assert_eq!(Uncertainty::Bound(0.6).within(0.2).bound(), 0.8);
+        let wider = SAMPLED.within(0.2);
+        assert_eq!((wider.standard_error(), wider.bound(), wider.degrees_of_freedom()), (Some(3.0), 0.2, Some(7.0)));
+        assert_eq!(Uncertainty::Exact.within(0.2), Uncertainty::Bound(0.2));
+    }
+
+    #[test]
+    fn dependent_errors_add_up_with_the_fewest_degrees_of_freedom() {
+        let other = Uncertainty::sampled(2.0, Some(3.0));
+        let sum = Uncertainty::of_dependent_sum([(1.0, BOUNDED), (-2.0, other), (-1.0, Uncertainty::Bound(0.1))]);
+        assert_eq!((sum.standard_error(), sum.bound(), sum.degrees_of_freedom()), (Some(7.0), 0.7, Some(3.0)));
+        let unstated = Uncertainty::of_dependent_sum([(1.0, SAMPLED), (1.0, Uncertainty::sampled(1.0, None))]);
+        assert_eq!(unstated.degrees_of_freedom(), Some(7.0));
+        assert_eq!(Uncertainty::of_dependent_sum([]), Uncertainty::Unstated);
+        let kinds = [(1.0, Uncertainty::Unstated), (1.0, Uncertainty::Exact)];
+        assert_eq!(Uncertainty::of_dependent_sum(kinds), Uncertainty::Exact);
+        // What was not seen does not count with a weight of zero.
+        let unseen = [(0.0, Uncertainty::NotSeen), (1.0, Uncertainty::Bound(0.1))];
+        assert_eq!(Uncertainty::of_dependent_sum(unseen), Uncertainty::Bound(0.1));
+    }
+
+    #[test]
+    fn fourth_powers_that_vanish_or_overflow_leave_the_fewest_degrees_of_freedom() {
+        for size in [1e-100, 1e100] {
+            let terms = [7.0, 3.0].map(|freedom| (1.0, Uncertainty::sampled(size, Some(freedom))));
+            let sum = Uncertainty::of_sum(terms);
+            assert_eq!(sum.degrees_of_freedom(), Some(3.0), "{sum:?}");
+            assert!((sum.standard_error().unwrap() / size - 2f64.sqrt()).abs() < 1e-12, "{sum:?}");
+        }
+        let unstated =
+            Uncertainty::of_sum([(1.0, Uncertainty::sampled(3.0, None)), (1.0, Uncertainty::sampled(4.0, None))]);
+        assert_eq!(unstated, Uncertainty::sampled(5.0, None));
+    }
+
+    #[test]
+    fn a_correlation_is_between_independent_and_dependent_errors() {
+        // Errors of 3 and 4: 25 of independent ones, 49 of dependent ones, 25 + r 24 in between (GUM 5.2.2).
+        let terms = [(1.0, BOUNDED), (1.0, Uncertainty::sampled(4.0, Some(20.0)))];
+        for (correlation, square) in [(0.0, 25.0), (0.25, 31.0), (1.0, 49.0)] {
+            let sum = Uncertainty::of_correlated_sum(terms, correlation);
+            assert!((sum.standard_error().unwrap().powi(2) - square).abs() < 1e-12, "{sum:?}");
+            assert_eq!((sum.bound(), sum.degrees_of_freedom()), (0.6, Some(7.0)));
+        }
+        let bounds = [(1.0, Uncertainty::Bound(0.1)), (1.0, Uncertainty::Bound(0.2))];
+        assert!((Uncertainty::of_correlated_sum(bounds, 0.5).bound() - 0.3).abs() < 1e-15);
+    }
+
+    #[test]
+    fn stages_count_by_their_effort() {
+        // A quarter of 4 and three quarters of 3: sqrt(1 + 81 / 16).
+        let both =
+            Uncertainty::of_stages([(1.0, Uncertainty::sampled(4.0, None)), (3.0, Uncertainty::sampled(3.0, None))]);
+        assert!((both.standard_error().unwrap().powi(2) - (1.0 + 81.0 / 16.0)).abs() < 1e-12, "{both:?}");
+        let turned = Uncertainty::of_stages([(3.0, SAMPLED), (1.0, Uncertainty::NotSeen)]);
+        assert!((turned.standard() - 3.0 * 0.75_f64.sqrt()).abs() < 1e-15, "{turned:?}");
+        let exact = Uncertainty::of_stages([(3.0, Uncertainty::sampled(0.0, None)), (1.0, Uncertainty::NotSeen)]);
+        assert_eq!(exact, Uncertainty::NotSeen);
+    }
+
+    #[test]
+    fn an_error_may_have_a_least_value_where_one_is_stated() {
+        assert_eq!(
+            BOUNDED.at_least(4.0),
+            Uncertainty::StandardError { value: 4.0, degrees_of_freedom: Some(7.0), bound: 0.6 }
+        );
+        assert_eq!(SAMPLED.at_least(2.0), SAMPLED);
+        let zero = Uncertainty::sampled(0.0, None);
+        assert_eq!([zero.at_least(1.0), Uncertainty::Exact.at_least(1.0)], [zero, Uncertainty::Exact]);
+    }
+
+    /// A standard error of 1 with this bound.
+    fn of_bound(bound: f64) -> Uncertainty {
+        Uncertainty::StandardError { value: 1.0, degrees_of_freedom: None, bound }
+    }
+
+    #[test]
+    fn a_sound_error_is_finite_and_not_negative_with_positive_degrees_of_freedom() {
+        for stated in ALL.into_iter().chain([Uncertainty::sampled(0.0, None), Uncertainty::Bound(0.0)]) {
+            assert!(stated.is_sound() && stated.is_finite(), "{stated:?}");
+        }
+        for (stated, is_finite) in [
+            (Uncertainty::sampled(f64::NAN, None), false),
+            (Uncertainty::Bound(f64::INFINITY), false),
+            (of_bound(f64::NAN), false),
+            (of_bound(-1.0), true),
+            (Uncertainty::sampled(-1.0, None), true),
+            (Uncertainty::Bound(-1.0), true),
+            (Uncertainty::sampled(1.0, Some(0.0)), true),
+            (Uncertainty::sampled(1.0, Some(-1.0)), true),
+        ] {
+            assert_eq!((stated.is_sound(), stated.is_finite()), (false, is_finite), "{stated:?}");
+        }
+    }
+
+    #[test]
+    fn files_have_the_fields_of_old_readers_too() {
+        for (stated, text) in [
+            (Uncertainty::Exact, r#"{"uncertainty":{"kind":"exact","value":0.0},"std_error":null,"error_bound":null}"#),
+            (
+                Uncertainty::Bound(0.5),
+                r#"{"uncertainty":{"kind":"bound","value":0.5},"std_error":null,"error_bound":0.5}"#,
+            ),
+            (
+                Uncertainty::Bound(0.0),
+                r#"{"uncertainty":{"kind":"bound","value":0.0},"std_error":null,"error_bound":0.0}"#,
+            ),
+            (
+                SAMPLED,
+                r#"{"uncertainty":{"kind":"standard_error","value":3.0,"degrees_of_freedom":7.0},"std_error":3.0,"error_bound":null}"#,
+            ),
+        ] {
+            assert_eq!(serde_json::to_string(&stated).unwrap(), text);
+        }
+        let old = serde_json::from_str::<Uncertainty>(r#"{"std_error": 3.0, "error_bound": 0.5}"#).unwrap();
+        assert_eq!(old, Uncertainty::StandardError { value: 3.0, degrees_of_freedom: None, bound: 0.5 });
+    }
 }

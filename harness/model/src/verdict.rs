@@ -42,3 +42,23 @@ impl Verdict {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn verdicts_have_their_names_and_three_of_them_are_bad() {
+        let all = [
+            (Verdict::Pass, "pass", false),
+            (Verdict::NotJudged, "not judged", false),
+            (Verdict::KnownDeviation, "known deviation", false),
+            (Verdict::Undecided, "undecided", false),
+            (Verdict::Fail, "fail", true),
+            (Verdict::UnexpectedPass, "unexpected pass", true),
+            (Verdict::Missing, "missing", true),
+        ];
+        for (verdict, name, is_bad) in all {
+            assert_eq!((verdict.name(), verdict.is_bad()), (name, is_bad));
+        }
+    }
+}
