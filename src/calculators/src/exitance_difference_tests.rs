@@ -221,3 +221,61 @@ fn a_ceiling_reflects_less_by_what_is_let_into_it() {
     let read = indirect_illuminance(&scene, &on_work_plane(5.0, 5.0)).unwrap();
     assert!(!format!("{:?}", read.validity).contains("obstacle"), "{:?}", read.validity);
 }
+
+#[test]
+fn walls_reflect_by_their_area() {
+    // Of walls of 8, 8, 4 and 4 m at one height a long one is dark: (8 * .1 + 16 * .5) / 24.
+    let mut scene = uplight_scene();
+    let reflectance = Reflectances { wall_x_min: 0.1, ..room().reflectance };
+    scene.room = Some(Room { size_m: DVec3::new(4.0, 8.0, 5.0), reflectance });
+    scene.luminaires[0].position_m = DVec3::new(2.0, 4.0, 4.0);
+    let solved = &Layers::of(&scene).unwrap().exitances(1.0).unwrap()[0];
+    assert_relative_eq!(solved.reflectances.walls, 8.8 / 24.0, max_relative = 1e-12);
+    // 5 h (4 + 8) / (4 * 8) for room, ceiling and floor cavities of 3, 1 and 1 m.
+    for (ratio, expected) in solved.cavity_ratios.iter().zip([5.625, 1.875, 1.875]) {
+        assert_relative_eq!(*ratio, expected, max_relative = 1e-12);
+    }
+    assert_relative_eq!(solved.flux.value(), 4920.0, max_relative = 1e-6);
+    assert_eq!(solved.luminaire_height_m, 4.0);
+    let utilization = solved.coefficients.utilization;
+    assert_relative_eq!(solved.work_plane.value(), utilization * 4920.0 / 32.0, max_relative = 1e-6);
+}
+
+/// The objection to the spacing of luminaires at these heights in a room of 12 m times so many.
+fn spacing_objection(heights_m: &[f64]) -> Option<String> {
+    let mut scene = uplight_scene();
+    let size_m = DVec3::new(12.0, 12.0 * heights_m.len() as f64, 20.0);
+    scene.room = Some(Room { size_m, ..room() });
+    let single = scene.luminaires.remove(0);
+    for height_m in heights_m {
+        scene.luminaires.push(Luminaire { position_m: DVec3::new(6.0, 6.0, *height_m), ..single.clone() });
+    }
+    match indirect_illuminance(&scene, &on_work_plane(5.0, 5.0)).unwrap().validity {
+        Validity::Approximate(why) => Some(why),
+        _ => None,
+    }
+}
+
+#[test]
+fn luminaires_may_be_spaced_by_one_and_a_half_times_the_height_of_the_lowest() {
+    assert_eq!(spacing_objection(&[10.0]), None);
+    let text = "1 luminaire(s) for 12.0 m of spacing where even light needs at most 11.7 m";
+    assert!(spacing_objection(&[9.8]).unwrap().contains(text));
+    assert_eq!(spacing_objection(&[10.0, 12.0]), None);
+    let text = "3 luminaire(s) for 12.0 m of spacing where even light needs at most 9.0 m";
+    assert!(spacing_objection(&[12.0, 8.0, 8.0]).unwrap().contains(text));
+}
+
+#[test]
+fn a_total_has_the_objections_of_both_parts() {
+    let mut scene = uplight_scene();
+    // Six sizes above the meter: approximate for the direct light, too.
+    let opening = LuminousOpening::Box { x_m: 4.0 / 3.0, y_m: 0.5, height_m: 0.0 };
+    let even = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap();
+    scene.luminaires[0].photometry = Arc::new(Photometry { opening, ..Photometry::of(even) });
+    scene.luminaires[0].model = LuminaireModel::Area;
+    let found = total_illuminance(&scene, &on_work_plane(10.0, 10.0)).unwrap().validity;
+    let Validity::Approximate(why) = found else { panic!("{found:?}") };
+    assert!(why.contains("6.00 times") && why.contains("12.0 m: the method spreads"), "{why}");
+    assert!(why.find("6.00 times") < why.find("spreads"), "{why}");
+}

@@ -329,3 +329,58 @@ fn where_rounding_decides_between_two_values_the_jump_is_their_distance() {
     assert_relative_eq!(jump_cd(&torn, below), 30.0, max_relative = 1e-12);
     assert_eq!([jump_cd(&torn, -below), jump_cd(&torn, level)], [0.0; 2]);
 }
+
+#[test]
+fn an_opening_that_is_cut_seen_edge_on_or_not_flat_has_no_lambertian_twin() {
+    let square = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let panel = luminaire(isotropic(), square, LuminaireModel::Area);
+    let below = DVec3::new(0.0, 0.0, -10.0);
+    assert!(lambertian_twin(&panel, &Meter { position_m: below, normal: DVec3::Z }).is_some());
+    // The meter's plane passes through the panel: the corners at +x are before it, the others behind it.
+    let aside = Meter { position_m: below, normal: DVec3::new(1.0, 0.0, 0.02).normalize() };
+    assert_eq!(lambertian_twin(&panel, &aside), None);
+    let level = Meter { position_m: DVec3::new(10.0, 0.0, 0.0), normal: DVec3::NEG_X };
+    assert_eq!(lambertian_twin(&panel, &level), None);
+    let high = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.1 };
+    let body = luminaire(isotropic(), high, LuminaireModel::Area);
+    assert_eq!(lambertian_twin(&body, &Meter { position_m: below, normal: DVec3::Z }), None);
+    // Without a twin the text gives the largest error of a square, 2 / 3 over the squared distance in sizes.
+    let scene = Scene { luminaires: vec![body], ..Scene::default() };
+    let found = Validity::of(&direct_illuminance(&scene, &facing_up(0.0, 0.0, -10.0)));
+    let Validity::Approximate(why) = found else { panic!("{found:?}") };
+    assert!(why.contains("10.00 times") && why.contains("up to about 0.67 %"), "{why}");
+}
+
+#[test]
+fn the_five_times_rule_holds_at_five_times() {
+    let square = LuminousOpening::Box { x_m: 0.5, y_m: 0.25, height_m: 0.0 };
+    let panel = luminaire(isotropic(), square, LuminaireModel::Area);
+    let rules = [-2.5, -2.499].map(|z| FiveTimesRule::check(&panel, &facing_up(0.0, 0.0, z)));
+    assert_eq!((rules[0].distance_over_size, rules.map(|rule| rule.holds())), (5.0, [true, false]));
+    let point = luminaire(isotropic(), LuminousOpening::Point, LuminaireModel::Area);
+    let scene = Scene { luminaires: vec![point], ..Scene::default() };
+    assert_eq!(direct_illuminance(&scene, &facing_up(0.0, 0.0, -1.0)).unwrap().validity, Validity::Supported);
+}
+
+/// Whether a box cuts the segment from the origin.
+fn is_cut(min_m: [f64; 3], max_m: [f64; 3], to_m: [f64; 3]) -> bool {
+    let shape = Shape::Box { min_m: DVec3::from(min_m), max_m: DVec3::from(max_m) };
+    blocks(&Obstacle { shape, reflectance: 0.5 }, DVec3::ZERO, DVec3::from(to_m))
+}
+
+#[test]
+fn a_box_cuts_a_segment_that_passes_its_inside_and_none_that_touches_it() {
+    let down = [0.0, 0.0, -2.0];
+    assert!(is_cut([-1.0, -1.0, -1.5], [1.0, 1.0, -1.0], down));
+    // The segment lies in a face, ends on one, begins on one.
+    assert!(!is_cut([0.0, -1.0, -1.5], [1.0, 1.0, -1.0], down));
+    assert!(!is_cut([-1.0, -1.0, -1.5], [0.0, 1.0, -1.0], down));
+    assert!(!is_cut([-1.0, -1.0, -3.0], [1.0, 1.0, -2.0], down));
+    assert!(!is_cut([-1.0, -1.0, 0.0], [1.0, 1.0, 1.0], down));
+    assert!(is_cut([-1.0, -1.0, -0.5], [1.0, 1.0, 0.5], down));
+    // A slanted one passes beside a box that it passes in each coordinate by itself.
+    let slanted = [2.0, 2.0, 1.0];
+    assert!(!is_cut([0.2, 1.0, 0.0], [0.4, 1.2, 1.0], slanted));
+    assert!(is_cut([0.2, 0.3, 0.0], [0.4, 1.2, 1.0], slanted));
+    assert!(!is_cut([0.2, 0.3, 0.2], [0.4, 1.2, 1.0], slanted));
+}

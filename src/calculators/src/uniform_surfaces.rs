@@ -202,4 +202,96 @@ mod tests {
             assert_relative_eq!(mean, flux * rho / ((1.0 - rho) * 2400.0), max_relative = 1e-12);
         }
     }
+
+    /// The solid angle of a room's surface from a point, as four rectangles with a corner at its foot.
+    fn solid_angle(room: &Room, surface: Surface, from_m: DVec3) -> f64 {
+        let axis = surface.axis();
+        let plane = if surface.is_far() { room.size_m[axis] } else { 0.0 };
+        let (u, v, distance) = ((axis + 1) % 3, (axis + 2) % 3, (plane - from_m[axis]).abs());
+        let mut sum = 0.0;
+        for a in [from_m[u], room.size_m[u] - from_m[u]] {
+            for b in [from_m[v], room.size_m[v] - from_m[v]] {
+                sum += (a * b / (distance * (a * a + b * b + distance * distance).sqrt())).atan();
+            }
+        }
+        sum
+    }
+
+    /// A scene with an isotropic luminaire of 100 cd in a room of 3 m, 7 m and 2.4 m.
+    fn isotropic_scene(position_m: DVec3) -> Scene {
+        let even = luxproof_photometry::LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]);
+        let mut scene = uplight_scene();
+        scene.room = Some(Room { size_m: DVec3::new(3.0, 7.0, 2.4), ..room() });
+        let photometry = luxproof_photometry::Photometry::of(even.unwrap());
+        scene.luminaires[0].photometry = std::sync::Arc::new(photometry);
+        scene.luminaires[0].position_m = position_m;
+        scene
+    }
+
+    #[test]
+    fn even_light_falls_on_each_surface_by_its_solid_angle() {
+        let position_m = DVec3::new(0.8, 4.5, 1.9);
+        let mut scene = isotropic_scene(position_m);
+        let room = scene.room.unwrap();
+        for scale in [1.0, 3.0] {
+            for (surface, flux) in Surface::ALL.iter().zip(solve(&scene).unwrap().first_flux) {
+                let expected = scale * 100.0 * solid_angle(&room, *surface, position_m);
+                // By directions half a degree from each other.
+                assert_relative_eq!(flux.value(), expected, max_relative = 1e-2);
+            }
+            // A second luminaire at the same place, twice as bright.
+            scene.luminaires.push(Luminaire { flux_scale: 2.0, ..scene.luminaires[0].clone() });
+        }
+    }
+
+    #[test]
+    fn a_luminaire_in_a_wall_lights_the_room_with_half_of_its_light() {
+        let mut scene = isotropic_scene(DVec3::new(0.0, 2.0, 1.0));
+        scene.luminaires[0].orientation = luxproof_scene::orientation(20.0, 90.0, 3.0);
+        let solved = solve(&scene).unwrap();
+        let total: f64 = solved.first_flux.iter().map(|flux| flux.value()).sum();
+        assert_relative_eq!(total, std::f64::consts::TAU * 100.0, max_relative = 2e-3);
+        for (surface, flux) in Surface::ALL.iter().zip(solved.first_flux) {
+            assert_eq!(flux.value() == 0.0, surface.axis() == 0 && !surface.is_far(), "{surface:?}");
+        }
+    }
+
+    #[test]
+    fn scenes_without_a_room_with_a_mirror_or_a_luminaire_outside_are_refused() {
+        let scene = uplight_scene();
+        let mirror = Room { reflectance: Reflectances::with_equal_walls(0.2, 1.0, 0.8), ..room() };
+        let mut outside = scene.clone();
+        outside.luminaires[0].position_m = DVec3::new(3.0, 12.0, 20.1);
+        for (wrong, part) in [
+            (Scene { room: None, ..scene.clone() }, "no room"),
+            (Scene { room: Some(mirror), ..scene.clone() }, "below 1"),
+            (outside, "outside the room"),
+        ] {
+            let refused = solve(&wrong).unwrap_err().to_string();
+            let begin = "the balance of six uniform surfaces does not apply: ";
+            assert!(refused.starts_with(begin) && refused.contains(part), "{refused}");
+        }
+        let black = Room { reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0), ..room() };
+        assert!(solve(&Scene { room: Some(black), ..scene }).unwrap().exitance.iter().all(|m| m.value() == 0.0));
+    }
+
+    #[test]
+    fn a_meter_reads_each_surface_by_its_configuration_factor() {
+        let room = Room { size_m: DVec3::new(2.0, 2.0, 2.0), ..room() };
+        let mut solved =
+            UniformSurfaces { room, exitance: [LumenPerSquareMetre(100.0); 6], first_flux: [Lumen(0.0); 6] };
+        // In a furnace every meter reads the exitance, wherever it looks.
+        let turned = Meter { position_m: DVec3::new(0.3, 1.1, 0.7), normal: DVec3::new(0.6, 0.0, -0.8) };
+        assert_relative_eq!(solved.indirect_illuminance(&turned).value(), 100.0, max_relative = 1e-12);
+        // A square of 2 m at 2 m, seen from its axis: four times a / sqrt(a^2 + h^2) atan(a / sqrt(a^2 + h^2)) / pi.
+        let ceiling = Surface::ALL.iter().position(|s| *s == Surface::Ceiling).unwrap();
+        solved.exitance = [LumenPerSquareMetre(0.0); 6];
+        solved.exitance[ceiling] = LumenPerSquareMetre(100.0);
+        let up = Meter { position_m: DVec3::new(1.0, 1.0, 0.0), normal: DVec3::Z };
+        let sine = 5f64.sqrt().recip();
+        let expected = 400.0 * sine * sine.atan() / std::f64::consts::PI;
+        assert_relative_eq!(solved.indirect_illuminance(&up).value(), expected, max_relative = 1e-12);
+        let down = Meter { normal: DVec3::NEG_Z, ..up };
+        assert_eq!(solved.indirect_illuminance(&down).value(), 0.0);
+    }
 }

@@ -331,3 +331,31 @@ fn what_is_behind_below_hidden_or_edge_on_does_not_glare() {
     point.luminaires[0].photometry = Arc::new(Photometry { opening: LuminousOpening::Point, ..panel.clone() });
     assert_eq!(Glare::seen(&point, &EYE), Err(NoGlare::NoArea("panel".to_owned())));
 }
+
+#[test]
+fn the_openings_that_count_have_their_number_and_solid_angles() {
+    let panel = panel(0.3, 0.1, |_, g| 900.0 * g.to_radians().cos());
+    let places = [[0.5, 4.0, 1.5], [0.0, 3.0, 1.0], [-1.0, 6.0, 2.0], [0.0, -3.0, 1.0]];
+    let seen = Glare::seen(&scene_of(&panel, &places), &EYE).unwrap();
+    // Area times cosine over the squared distance, of a panel that lies level: .03 z / r^3.
+    let sizes = [0, 1, 2].map(|k| 0.03 * places[k][2] / DVec3::from(places[k]).length().powi(3));
+    let [least, most] = [f64::min, f64::max].map(|pick| sizes.into_iter().reduce(pick).unwrap());
+    assert_eq!(seen.openings, 3);
+    assert_relative_eq!(seen.solid_angles_sr[0], least, max_relative = 1e-9);
+    assert_relative_eq!(seen.solid_angles_sr[1], most, max_relative = 1e-9);
+    // An eye that looks along x sees the same there.
+    let turned = places.map(|[x, y, z]| [y, -x, z]);
+    let along_x = Glare::seen(&scene_of(&panel, &turned), &Meter { normal: DVec3::X, ..EYE }).unwrap();
+    assert_relative_eq!(along_x.sum, seen.sum, max_relative = 1e-9);
+    // And one elsewhere the same about it.
+    let elsewhere = DVec3::new(7.0, -2.0, 1.2);
+    let moved = places.map(|place| (DVec3::from(place) + elsewhere).to_array());
+    let there = Glare::seen(&scene_of(&panel, &moved), &Meter { position_m: elsewhere, ..EYE }).unwrap();
+    assert_relative_eq!(there.sum, seen.sum, max_relative = 1e-9);
+}
+
+#[test]
+fn a_rating_is_eight_times_the_logarithm_of_a_quarter_of_the_sum_over_the_background() {
+    // L_b = E / pi = 10 cd/m2: 8 lg(.25 * 4000 / 10) = 16.
+    assert_relative_eq!(rating(4000.0, Lux(10.0 * PI)), 16.0, max_relative = 1e-12);
+}
