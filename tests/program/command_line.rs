@@ -282,3 +282,11 @@ fn a_usage_error_is_exit_2() {
     room.luxproof(&["run", "no-such-spec.yaml"]).exits(2);
     room.luxproof(&["run", "spec.yaml", "--engines", "blender"]).exits(2);
 }
+
+#[test]
+fn the_citation_names_the_version_that_the_program_prints() {
+    let citation = fs::read_to_string(root().join("CITATION.cff")).unwrap();
+    let version = citation.lines().find_map(|line| line.strip_prefix("version: ")).unwrap();
+    let printed = Folder::new(&[]).luxproof(&["--version"]).exits(0);
+    printed.prints(&format!("luxproof {version}"));
+}
