@@ -18,13 +18,14 @@ def reproduce(what: str | os.PathLike[str], *, out: str | os.PathLike[str], opti
     """Makes a paper's tables again, or the run of a bundle, as `luxproof reproduce` does; the new run's files lie in `out`.
 
     Of a paper's tables (YAML) a row a printed cell: table, column, place, printed; rounding, computed and uncertainty (half width of
-    its interval) in `unit`; standing: reproduced, not_reproduced, undecided, not_read. Of a bundle a row a case, procedure and engine:
+    its interval) in `unit`; standing: reproduced, not_reproduced, undecided, not_read; fits_table: whether the cell
+    agrees with the other columns of its own table. Of a bundle a row a case, procedure and engine:
     outcome, comparisons, differences, notes. Raises LuxproofError where it is no bundle or no table, or the bundle was changed.
     """
     answer = ask(["reproduce", os.fspath(what), "--out", os.fspath(out), "--format", "json", *options])
     found = json.loads(answer.stdout)
     if isinstance(found, dict):
         return table(found["rows"], ["case", "procedure", "engine", "outcome", "comparisons", "differences", "notes"], {})
-    columns = ["table", "column", "place", "printed", "rounding", "unit", "engine", "model", "computed", "uncertainty", "standing", "note"]
+    columns = ["table", "column", "place", "printed", "rounding", "unit", "engine", "model", "computed", "uncertainty", "standing", "fits_table", "note"]
     lux = "lx or cd, as unit says"
     return table(found, columns, {"rounding": lux, "computed": lux, "uncertainty": lux})

@@ -36,8 +36,9 @@ PRINTED = {
     ("5.11", "4x3m-sky-5", "A"): 4.0, ("5.11", "4x3m-sky-5", "C"): -2.1, ("5.11", "4x3m-sky-5", "D"): 1.9,
     ("5.11", "4x3m-sky-5", "F"): -1.6, ("5.11", "4x3m-sky-5", "N"): 1.8, ("5.10", "4m-sky-1", "A"): 5.6,
 }
+# -6.8 % of case 5.9 stands without its place; .3728 % over .40 % fits it.
 PUBLISHED = {("5.10", "4m-sky-1", "A"): -8.37, ("5.10", "4m-sky-1", "B"): -1.93, ("5.10", "1m-sky-1", "A"): -19.0,
-             ("5.11", "4x3m-sky-5", "A"): -8.9}
+             ("5.9", "1m-sky-2", "A"): -6.8, ("5.11", "4x3m-sky-5", "A"): -8.9}
 ABSORBED = .96          # of both panes, at every angle
 ABSORPTION_ROUNDING = .3        # what its two digits leave, in percent
 GROUND_M = 72           # fitted to B, C and D of case 5.11
@@ -112,7 +113,7 @@ def main():
             deviation = PUBLISHED.get(key, (reading / printed - 1) * 100)
             if abs(deviation) > 1:
                 rows.append((f"{case} {name}", letter, deviation, rounding, causes))
-    for letter, deviation in (("A", 4.95), ("B", 1.40), ("D", 1.26)):
+    for letter, deviation in (("A", 4.94), ("B", 1.40), ("D", 1.26)):
         rows.append(("5.3", letter, deviation, .05, {"unit": None}))
     for rho, deviation in ((.9, -11.65), (.95, -32.42)):
         rows.append((f"5.8 rho {rho}", "mean", deviation, .05, {"reflections": rho}))

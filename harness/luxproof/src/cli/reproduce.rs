@@ -141,10 +141,17 @@ fn study_text(explanation: &Explanation) -> String {
     let explained = explanation.deviations.iter().filter(|d| d.is_explained).count();
     let scatter = explanation.deviations.iter().filter(|d| d.is_explained && d.is_scatter).count();
     let mut text = format!("{}: {explained} of {all} published deviations are explained", explanation.title);
-    text += &if scatter > 0 { format!(", {scatter} of them as scatter\n\n") } else { "\n\n".to_owned() };
+    if scatter > 0 {
+        text += &format!(": {} by causes, {scatter} as scatter alone", explained - scatter);
+    }
+    text += ".\nNo engine runs: shares and rests are computed from the numbers of the study's file.\n\n";
     for deviation in &explanation.deviations {
         let causes: Vec<String> = deviation.contributions.iter().map(contribution_text).collect();
-        let verdict = if deviation.is_explained { "explained" } else { "open" };
+        let verdict = match (deviation.is_explained, deviation.is_scatter) {
+            (true, true) => "within scatter",
+            (true, false) => "explained",
+            (false, _) => "open",
+        };
         text += &format!(
             "  {:<18} {:<4} {:>+7.2} %  {}; rest {:+.2} ± {:.2} %: {verdict}\n",
             deviation.case,
@@ -375,15 +382,14 @@ fn cells_text(report: &Report, cells: &[Cell]) -> String {
     let of = [Standing::NotReproduced, Standing::Undecided, Standing::NotRead].map(|s| (count_cells(cells, s), s));
     let rest: Vec<String> =
         of.into_iter().filter(|(n, _)| *n > 0).map(|(n, standing)| format!("{n} {standing}")).collect();
-    let misfits = cells.iter().filter(|cell| cell.standing != Standing::Reproduced && cell.note.is_some()).count();
     let title = report.published.first().map_or(report.spec.title.as_str(), |table| &table.title);
     let mut text = format!(
         "{title}: {} of {} printed cells come out again within their rounding",
         count_cells(cells, Standing::Reproduced),
         cells.len()
     );
-    text += &if rest.is_empty() { String::new() } else { format!("; {}", rest.join(", ")) };
-    text += &if misfits == 0 { "\n".to_owned() } else { format!(" ({misfits} of them do not fit their own table)\n") };
+    text += &if rest.is_empty() { "\n".to_owned() } else { format!("; {}\n", rest.join(", ")) };
+    text += &misfits_text(cells);
     let mut tables: BTreeMap<&str, Vec<&Cell>> = BTreeMap::new();
     for cell in cells {
         tables.entry(&cell.table).or_default().push(cell);
@@ -394,6 +400,21 @@ fn cells_text(report: &Report, cells: &[Cell]) -> String {
         text += &rows(&cells);
     }
     text
+}
+
+/// A line on the cells that do not fit the other columns of their own table, by their standings; empty without any.
+fn misfits_text(cells: &[Cell]) -> String {
+    let misfits: Vec<&Cell> = cells.iter().filter(|cell| !cell.fits_table).collect();
+    if misfits.is_empty() {
+        return String::new();
+    }
+    let standings = [Standing::Reproduced, Standing::NotReproduced, Standing::Undecided, Standing::NotRead];
+    let counts = standings.map(|standing| (misfits.iter().filter(|cell| cell.standing == standing).count(), standing));
+    let counts: Vec<String> =
+        counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, standing)| format!("{n} {standing}")).collect();
+    let count = misfits.len();
+    let misfit = if count == 1 { "does not fit its" } else { "do not fit their" };
+    format!("of all {} cells {count} {misfit} own table: {}\n", cells.len(), counts.join(", "))
 }
 
 /// The columns of a cell's line.
@@ -422,4 +443,38 @@ fn rows(cells: &[&Cell]) -> String {
     let rows: Vec<[String; 6]> = std::iter::once(head).chain(cells.iter().map(|cell| columns(cell))).collect();
     let widths = std::array::from_fn(|k| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0));
     rows.iter().map(|row| padded_line(row, &widths)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(standing: Standing, fits_table: bool) -> Cell {
+        Cell {
+            table: "Table 1".into(),
+            column: "lum2".into(),
+            place: "(2, 2, 2)".into(),
+            printed: "1.99".into(),
+            rounding: 0.01,
+            unit: "lx",
+            engine: "radiance".into(),
+            model: "area".into(),
+            computed: Some(2.0),
+            uncertainty: Some(0.01),
+            standing,
+            fits_table,
+            // A note alone, such as why nothing was read, is no misfit.
+            note: Some("a note".into()),
+        }
+    }
+
+    #[test]
+    fn cells_that_do_not_fit_their_table_are_counted_of_all_cells_whatever_their_standing() {
+        let (same, open, none) = (Standing::Reproduced, Standing::Undecided, Standing::NotRead);
+        let cells = [cell(same, false), cell(same, true), cell(open, false), cell(open, false), cell(none, true)];
+        let text = misfits_text(&cells);
+        assert_eq!(text, "of all 5 cells 3 do not fit their own table: 1 within rounding, 2 undecided\n");
+        assert_eq!(misfits_text(&cells[..2]), "of all 2 cells 1 does not fit its own table: 1 within rounding\n");
+        assert_eq!(misfits_text(&cells[1..2]), "");
+    }
 }

@@ -46,6 +46,8 @@ pub struct Cell {
     /// Half width of its interval, at the coverage of verdicts.
     pub uncertainty: Option<f64>,
     pub standing: Standing,
+    /// Whether the cell agrees with the other columns of its table, whatever was computed.
+    pub fits_table: bool,
     /// Why the cell does not fit the rest of its table, or why nothing was read.
     pub note: Option<String>,
 }
@@ -109,6 +111,7 @@ fn cell(
             Some(Verdict::Undecided) => Standing::Undecided,
             _ => Standing::NotRead,
         },
+        fits_table: misfit.is_none(),
         note: misfit.or(why_not_read),
     })
 }
