@@ -17,7 +17,7 @@ pub fn rounded(value: f64, digits: usize) -> Option<f64> {
 /// The next of 1, 2, 2.5, 5, 10 times a power of ten.
 pub fn round_step(raw: f64) -> f64 {
     let decade = 10f64.powf(raw.log10().floor());
-    [1.0, 2.0, 2.5, 5.0, 10.0].map(|d| d * decade).into_iter().find(|s| *s >= raw * 0.999).unwrap_or(10.0 * decade)
+    [1.0, 2.0, 2.5, 5.0].map(|d| d * decade).into_iter().find(|s| *s >= raw * 0.999).unwrap_or(10.0 * decade)
 }
 
 /// A number with at most so many decimals, without trailing zeros.

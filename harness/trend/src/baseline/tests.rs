@@ -407,3 +407,16 @@ fn what_is_unchanged_is_not_asked_about_and_an_ended_input_declines() {
     let (decision, _) = reviewed(&[], &old, "y\n");
     assert_eq!((decision.accepted.len(), decision.declined), (0, 1), "no reason was given");
 }
+
+#[test]
+fn a_baseline_in_a_folder_is_named_after_its_spec() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = SpecRecord { path: "specs/office.yaml other.yaml".to_owned(), ..SpecRecord::default() };
+    let named = folder.path().join("accepted.json");
+    assert_eq!(Baseline::place(&named, &run), named);
+    // A folder is one whatever it is called, and a name without an ending is that of a folder.
+    fs::create_dir(&named).unwrap();
+    assert_eq!(Baseline::place(&named, &run), named.join("office.json"));
+    assert_eq!(Baseline::place(folder.path(), &run), folder.path().join("office.json"));
+    assert_eq!(Baseline::place(folder.path(), &SpecRecord::default()), folder.path().join("suite.json"));
+}

@@ -214,3 +214,168 @@ fn residual_of_steps(points: &[Point], steps: usize) -> f64 {
         .map(|k| residual_of_steps(&points[..k], steps - 1) + residual_of_steps(&points[k..], 0))
         .fold(f64::INFINITY, f64::min)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::series::Key;
+    use luxproof_model::{MeterId, ProcedureId, ReadingKey};
+    use luxproof_process::random::normal;
+
+    fn is_near(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 1e-9 * expected.abs().max(1.0)
+    }
+
+    fn series(reference: f64, std_error: &[f64], deviation: &[f64]) -> Series {
+        let key = Key {
+            reading: ReadingKey::new("room", ProcedureId::IndirectIlluminance, "mine"),
+            model: String::new(),
+            meter: MeterId::new("desk", 0),
+            basis: None,
+            source: String::new(),
+        };
+        let (reference, verdicts) = (vec![reference; deviation.len()], vec![None; deviation.len()]);
+        Series { key, deviation: deviation.to_vec(), std_error: std_error.to_vec(), reference, verdicts }
+    }
+
+    #[test]
+    fn a_trend_adds_deviations_in_standard_errors_and_gives_steps_their_relative_size() {
+        // Errors of 2 (the root of the mean of 1, 1, 1, 1 and 16) and 1: shifts of 2 are one error and two.
+        let one = series(100.0, &[1.0, 1.0, 1.0, 1.0, 4.0], &[1.0, 1.0, 1.0, 3.0, 3.0]);
+        let other = series(-50.0, &[1.0; 5], &[0.0, 0.0, 0.0, 2.0, 2.0]);
+        let trend = Trend::new(&[&one, &other], 0, 3, 5);
+        assert!(is_near(trend.step(0..3), 0.0) && is_near(trend.step(3..5), 3.0 / 2f64.sqrt()));
+        assert!(is_near(trend.relative * trend.step(3..5), (50.0 * 0.02 + 50.0 * 0.04) / 100.0));
+        assert!(is_near(trend.standard_errors * trend.step(3..5), 1.5));
+        // A night without a reading has no value, and the level is that before the change alone.
+        let mut sparse = one.clone();
+        (sparse.deviation[1], sparse.deviation[3]) = (f64::NAN, f64::NAN);
+        let alone = Trend::new(&[&sparse], 0, 3, 5);
+        assert!(alone.values[1].is_nan() && alone.values[3].is_nan());
+        // The errors of the nights that were read: (1 + 1 + 16) / 3 = 6.
+        assert!(is_near(alone.step(3..5), 2.0 / 6f64.sqrt()) && is_near(alone.relative, 6f64.sqrt() / 100.0));
+        let both = Trend::new(&[&sparse, &other], 0, 3, 5);
+        assert!(is_near(both.values[3], 2.0), "{:?}", both.values);
+        // A series without nights before the change shows none.
+        let later = Trend::new(&[&one], 3, 3, 5);
+        assert!(later.values.iter().all(|v| v.is_nan()) && later.relative == 0.0);
+        // Without errors a millionth of the value is one; nights before the start do not count.
+        let exact = series(100.0, &[0.0; 5], &[900.0, 0.0, 0.0, 1e-3, 1e-3]);
+        let from_second = Trend::new(&[&exact], 1, 3, 5);
+        assert!(from_second.values[0].is_nan() && (from_second.step(3..5) - 10.0).abs() < 1e-3);
+    }
+
+    fn trend(values: &[f64], change: usize) -> Trend {
+        Trend { values: values.to_vec(), start: 0, change, relative: 1.0, standard_errors: 1.0 }
+    }
+
+    #[test]
+    fn outliers_before_a_change_are_moved_to_four_spreads_from_the_median() {
+        // Of the first six the median is .25, and that of the distances .75: 4 * 1.4826 * .75 = 4.4478.
+        let found = trend(&[-1.0, -0.5, 0.0, 0.5, 1.0, 100.0, 50.0], 6).points_without_outliers(7);
+        let values: Vec<f64> = found.iter().map(|(_, value)| *value).collect();
+        let expected = [-1.0, -0.5, 0.0, 0.5, 1.0, 4.6978, 50.0];
+        assert!(values.iter().zip(expected).all(|(v, e)| is_near(*v, e)), "{values:?}");
+        assert_eq!(found.iter().map(|(night, _)| *night).collect::<Vec<_>>(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        // The least spread is a tenth of a standard error.
+        let exact = trend(&[0.0, 0.0, 0.0, 7.0, 0.0, 9.0, 1.0], 6).points_without_outliers(6);
+        assert_eq!(exact.iter().map(|(_, value)| *value).collect::<Vec<_>>(), [0.0, 0.0, 0.0, 0.4, 0.0, 0.4]);
+    }
+
+    #[test]
+    fn a_straight_line_is_that_of_least_squares() {
+        // By hand: means 1.5 and 3.75, sums 5 and 8.5.
+        let line = StraightLine::through(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0), (3.0, 6.0)]).unwrap();
+        assert_eq!((line.middle, line.mean, line.squares), (1.5, 3.75, 5.0));
+        assert!(is_near(line.slope, 1.7));
+        assert!(StraightLine::through(&[(2.0, 1.0), (2.0, 3.0)]).is_none() && StraightLine::through(&[]).is_none());
+    }
+
+    /// The residual of the best level and slope after a night, by the normal equations and a sum over the points.
+    fn residual_by_hand(points: &[Point], night: f64) -> (f64, f64) {
+        let (mut n, mut x, mut xx, mut y, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (time, value) in points {
+            let since = if *time > night { time - night } else { 0.0 };
+            (n, x, xx, y, xy) = (n + 1.0, x + since, xx + since * since, y + value, xy + since * value);
+        }
+        let slope = (n * xy - x * y) / (n * xx - x * x);
+        let level = (y - slope * x) / n;
+        let mut residual = 0.0;
+        for (time, value) in points {
+            residual += (value - level - slope * if *time > night { time - night } else { 0.0 }).powi(2);
+        }
+        (residual, slope)
+    }
+
+    #[test]
+    fn a_kink_is_where_a_level_and_a_line_fit_best() {
+        let mut random = fastrand::Rng::with_seed(5);
+        for start in [4, 9, 13] {
+            let points: Vec<Point> =
+                (0..20).map(|n| (f64::from(n), f64::from((n - start).max(0)) + 0.5 * normal(&mut random))).collect();
+            let found = kink(&points, 0).unwrap();
+            let best = (0..19).map(|night| residual_by_hand(&points, f64::from(night)));
+            let (residual, slope) = best.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+            assert!((found.residual - residual).abs() < 1e-9 && (found.slope - slope).abs() < 1e-9, "{found:?}");
+            assert_eq!(residual_by_hand(&points, found.night as f64).0, residual);
+            // The interval is that of a line through the nights since: t of 16 degrees of freedom is 2.17 (GUM table G.2).
+            let since: Vec<f64> = (found.night..20).map(|n| n as f64).collect();
+            let middle = since.iter().sum::<f64>() / since.len() as f64;
+            let squares: f64 = since.iter().map(|n| (n - middle).powi(2)).sum();
+            let expected = 2.17 * (residual / 16.0 / squares).sqrt();
+            assert!((found.half_width / expected - 1.0).abs() < 3e-3, "{found:?} {expected}");
+        }
+        // Exact points have the least spread, .1: t of 6 degrees of freedom is 2.52, and nights 3 to 9 have squares of 28.
+        let exact: Vec<Point> = (0..10).map(|n| (f64::from(n), 1.0 + 2.0 * f64::from((n - 3).max(0)))).collect();
+        let found = kink(&exact, 0).unwrap();
+        assert!(found.night == 3 && is_near(found.slope, 2.0), "{found:?}");
+        assert!((found.half_width / (2.52 * (0.01_f64 / 28.0).sqrt()) - 1.0).abs() < 3e-3, "{found:?}");
+        assert_eq!(kink(&exact, 5).unwrap().night, 5);
+        assert!(kink(&exact[..4], 0).is_none() && kink(&exact[..5], 0).is_some() && kink(&[], 0).is_none());
+    }
+
+    fn points(values: &[f64]) -> Vec<Point> {
+        values.iter().map(|v| (0.0, *v)).collect()
+    }
+
+    #[test]
+    fn steps_explain_levels() {
+        // 9 + 9 - 6^2 / 5; of 0, 1, 1 it is 2 - 2^2 / 3.
+        let one_step = points(&[0.0, 0.0, 0.0, 3.0, 3.0]);
+        assert!(is_near(residual_of_steps(&one_step, 0), 10.8) && residual_of_steps(&one_step, 1) == 0.0);
+        let two_steps = points(&[0.0, 1.0, 1.0, 5.0, 5.0]);
+        assert!(is_near(residual_of_steps(&two_steps, 1), 2.0 / 3.0) && residual_of_steps(&two_steps, 2) == 0.0);
+        assert_eq!(residual_of_steps(&[], 0), 0.0);
+    }
+
+    /// A level of ten nights and a line of so many, with noise of a tenth.
+    fn drifting(nights: u32, slope: f64) -> Trend {
+        let mut random = fastrand::Rng::with_seed(3);
+        let values = (0..10 + nights).map(|n| slope * (f64::from(n) - 9.0).max(0.0) + 0.1 * normal(&mut random));
+        trend(&values.collect::<Vec<f64>>(), 10)
+    }
+
+    #[test]
+    fn a_line_is_a_drift_where_steps_explain_clearly_less() {
+        let found = drifting(10, 1.0).drift(20, 1).unwrap();
+        assert!(found.night.abs_diff(9) <= 1 && (found.slope - 1.0).abs() < found.half_width, "{found:?}");
+        assert!(drifting(10, 1.0).drift(9, 1).is_none() && drifting(10, 0.0).drift(20, 1).is_none());
+        let step: Vec<f64> = (0..20).map(|n| if n < 10 { 0.0 } else { 5.0 }).collect();
+        assert_eq!(trend(&step, 10).drift(20, 1), None);
+    }
+
+    #[test]
+    fn a_night_on_a_line_is_judged_by_the_error_of_its_prediction() {
+        // Nights 3 to 9 on a line: the error of night 10 is the root of 1 + 1/7 + 4^2 / 28. A value .5 above is 3.819 spreads of .1.
+        let mut values: Vec<f64> = (0..10).map(|n| 1.0 + 2.0 * (f64::from(n) - 3.0).max(0.0)).collect();
+        values.push(15.5);
+        let on_line = trend(&values, 4);
+        let drift = on_line.line(10).unwrap();
+        let found: Vec<(usize, f64)> = on_line.line_deviates(&drift, 10).collect();
+        // Student's t of 7 degrees of freedom exceeds 3.819 on either side with .00655: 2.7184 of a normal distribution.
+        assert!(found.len() == 1 && found[0].0 == 10 && (found[0].1 - 2.7184).abs() < 0.02, "{found:?}");
+        values[10] = 14.5;
+        let below: Vec<(usize, f64)> = trend(&values, 4).line_deviates(&drift, 10).collect();
+        assert!((below[0].1 + found[0].1).abs() < 1e-6, "{below:?}");
+    }
+}

@@ -333,6 +333,8 @@ fn normal_deviate(t: f64, degrees_of_freedom: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::history::series::Key;
+    use luxproof_model::{MeterId, ProcedureId, ReadingKey};
 
     #[test]
     fn the_deviate_is_as_likely_as_students_t() {
@@ -349,5 +351,253 @@ mod tests {
         assert_eq!((moderated.squares, moderated.count), (90.0, 60));
         let unchanged = Spread::known(40.0, 10).moderated_by(Spread::known(40.0, 10));
         assert_eq!((unchanged.squares, unchanged.count), (40.0, 10));
+    }
+
+    fn is_near(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 1e-9 * expected.abs().max(1.0)
+    }
+
+    /// A series about a reference of 100.
+    fn series(std_error: &[f64], deviation: &[f64]) -> Series {
+        let key = Key {
+            reading: ReadingKey::new("room", ProcedureId::IndirectIlluminance, "mine"),
+            model: String::new(),
+            meter: MeterId::new("desk", 0),
+            basis: None,
+            source: String::new(),
+        };
+        let (reference, verdicts) = (vec![100.0; deviation.len()], vec![None; deviation.len()]);
+        Series { key, deviation: deviation.to_vec(), std_error: std_error.to_vec(), reference, verdicts }
+    }
+
+    #[test]
+    fn the_innovation_of_a_group_is_the_sum_over_the_root_of_its_number() {
+        let of_group = Innovation::of_group([3.0, -1.0, 4.0, 2.0].map(Innovation).into_iter()).unwrap();
+        assert_eq!(of_group.0, 4.0);
+        assert!(Innovation::of_group(std::iter::empty()).is_none());
+    }
+
+    #[test]
+    fn a_spread_is_the_root_of_the_mean_square_and_an_outlier_counts_as_four_of_it() {
+        let mut spread = Spread::default();
+        assert_eq!((spread.value(), spread.max_step()), (MIN_SPREAD, f64::INFINITY));
+        for innovation in [100.0, 1.0, -1.0, 1.0, -1.0, 0.0] {
+            spread.update(Innovation(innovation));
+        }
+        // The first six count in full.
+        assert_eq!((spread.squares, spread.count), (10_004.0, 6));
+        let mut calm = Spread::known(24.0, 6);
+        assert_eq!((calm.value(), calm.max_step()), (2.0, 8.0));
+        calm.update(Innovation(-50.0));
+        assert_eq!((calm.squares, calm.count), (24.0 + 64.0, 7));
+        calm.update(Innovation(3.0));
+        assert_eq!((calm.squares, calm.count), (24.0 + 64.0 + 9.0, 8));
+        // 2.571 spreads of two with five degrees of freedom: 5 % on either side of t, 1.96 of a normal distribution.
+        assert!((Spread::known(20.0, 5).deviate(Innovation(5.142)) - 1.960).abs() < 0.02);
+        let none = Spread::known(5.0, 5).moderated_by(Spread::known(100.0, 4));
+        assert_eq!((none.squares, none.count), (5.0, 5));
+        // Two nights more count with the mean of the peers.
+        let two = Spread::known(5.0, 5).moderated_by(Spread::known(70.0, 7));
+        assert_eq!((two.squares, two.count), (25.0, 7));
+    }
+
+    /// The sample of these numbers.
+    fn sample(numbers: impl IntoIterator<Item = f64>) -> Sample {
+        let mut sample = Sample::default();
+        numbers.into_iter().for_each(|number| sample.insert(number));
+        sample
+    }
+
+    #[test]
+    fn a_deviate_is_limited_by_its_rank_and_by_a_cubic_tail() {
+        let known = sample([3.0, 1.0, 9.0, 2.0, 8.0, 7.0, 4.0, 6.0, 5.0]);
+        assert_eq!(known.sorted, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
+        // Quantiles of the normal distribution: .0729 = .9^3 / 10 beyond 1.45449, .1 beyond 1.28155, .2 beyond .84162.
+        for (standardised, deviate) in
+            [(10.0, 1.45449), (9.5, 1.37203), (8.5, 0.84162), (9.0, 0.84162), (5.5, 0.0), (0.5, 0.0), (-1.0, 1.28155)]
+        {
+            let found = known.max_deviate(standardised);
+            assert!((found - deviate).abs() < 1e-4, "{standardised}: {found}");
+        }
+        // Likewise on the other side, where what is equal has a rank too.
+        let mirrored = sample(known.sorted.iter().map(|x| -x));
+        assert!((mirrored.max_deviate(-10.0) - 1.45449).abs() < 1e-4);
+        assert!((mirrored.max_deviate(-9.0) - 0.84162).abs() < 1e-4);
+        assert_eq!((known.largest(1.0), known.largest(-1.0), mirrored.largest(-1.0)), (9.0, -1.0, 9.0));
+        // Nothing is known: an even chance for what is small, and a tail beyond one.
+        assert_eq!((Sample::default().largest(1.0), Sample::default().max_deviate(0.5)), (0.0, 0.0));
+        // (1 / 2)^3 beyond 1.15035.
+        assert!((Sample::default().max_deviate(2.0) - 1.15035).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_tail_is_heavy_where_it_goes_farther_than_a_normal_one() {
+        // The largest of 19 normal numbers is about 1.96: .5 / 20 beyond it.
+        for (largest, is_heavy) in [(2.75, false), (2.77, true)] {
+            let upwards = sample((0..18).map(f64::from).map(|n| n / 18.0).chain([largest]));
+            assert_eq!((upwards.is_heavy(1.0), upwards.is_heavy(-1.0)), (is_heavy, false), "{largest}");
+            let downwards = sample(upwards.sorted.iter().map(|x| -x));
+            assert_eq!((downwards.is_heavy(1.0), downwards.is_heavy(-1.0)), (false, is_heavy), "{largest}");
+        }
+    }
+
+    #[test]
+    fn a_long_sample_is_thinned_evenly() {
+        let mut long = sample((0..MAX_SAMPLE).map(|n| n as f64));
+        assert_eq!((long.sorted.len(), long.stride), (2048, 1));
+        long.insert(2048.0);
+        assert_eq!((long.sorted.len(), long.stride, long.count), (1025, 2, 2049));
+        assert!(long.sorted.iter().enumerate().all(|(k, x)| *x == 2.0 * k as f64));
+        long.insert(7.0);
+        long.insert(9.0);
+        assert_eq!((long.sorted.len(), long.count, long.sorted[4]), (1026, 2051, 7.0));
+    }
+
+    #[test]
+    fn a_night_is_judged_by_its_own_noise_and_that_of_its_peers() {
+        let mut own = Noise::default();
+        assert_eq!(own.deviate(None, Innovation(1.0)), None);
+        own.update(None, Innovation(2.0));
+        assert_eq!(own.deviate(None, Innovation(1.0)), None);
+        own.update(None, Innovation(-2.0));
+        assert_eq!(own.deviate(None, Innovation(3.0)), Some(normal_deviate(1.5, 2)));
+        assert_eq!(own.sample.sorted, [-1.0, 1.0]);
+        // Peers with more nights count, and limit by their distribution.
+        let peers = Noise {
+            spread: Spread::known(100.0, 100),
+            sample: Rc::new(sample((0..100).map(|n| f64::from(n) / 50.0 - 1.0))),
+            has_heavy_members: false,
+        };
+        let spread = Spread::known(8.0 + 50.0, 52);
+        let innovation = Innovation(5.0);
+        let found = own.deviate(Some(&peers), innovation).unwrap();
+        let most = peers.sample.max_deviate(5.0 / spread.value());
+        assert!(spread.deviate(innovation) > most && found == most, "{found} {most}");
+        assert_eq!(own.deviate(Some(&peers), Innovation(-5.0)), Some(-peers.sample.max_deviate(-5.0 / spread.value())));
+        // Of peers with heavy tails nothing is judged in the first nights.
+        let heavy = Noise { sample: Rc::new(sample([-9.0, 1.0, -1.0])), ..peers.clone() };
+        assert_eq!(own.deviate(Some(&heavy), innovation), None);
+        let heavy = Noise { sample: Rc::new(sample([9.0, 1.0, -1.0])), ..peers };
+        assert_eq!(own.deviate(Some(&heavy), innovation), None);
+        let mut later = own.clone();
+        (0..4).for_each(|_| later.update(None, Innovation(1.0)));
+        assert!(later.deviate(Some(&heavy), innovation).is_some());
+        // Heavy members limit their sum by its own nights.
+        let members = Noise { has_heavy_members: true, sample: Rc::default(), ..heavy };
+        let most = own.sample.max_deviate(5.0 / spread.value());
+        assert_eq!(own.deviate(Some(&members), innovation), Some(spread.deviate(innovation).min(most)));
+    }
+
+    #[test]
+    fn heavy_tails_of_twenty_nights_of_its_own_limit_a_group() {
+        let quiet = (0..18).map(|n| if n % 2 == 0 { 0.5 } else { -0.5 });
+        for (count, is_limited) in [(18, false), (19, true)] {
+            let mut own = Noise::default();
+            quiet.clone().chain([0.5]).take(count).for_each(|x| own.update(None, Innovation(x)));
+            own.update(None, Innovation(9.0));
+            let (innovation, spread) = (Innovation(3.0), own.spread);
+            let free = spread.deviate(innovation);
+            assert_eq!(own.deviate(None, innovation).unwrap() < free, is_limited, "{count}");
+            // The other tail is not heavy.
+            assert_eq!(own.deviate(None, Innovation(-3.0)), Some(-free));
+        }
+    }
+
+    #[test]
+    fn a_mean_predicts_the_next_night_with_the_error_of_both() {
+        let read = series(&[1.0, 3.0, 0.0, 9.0], &[1.0, 5.0, f64::NAN, 3.0]);
+        let mut mean = RunningMean::default();
+        assert!(mean.innovation(&read, 0).is_none() && mean.update(&read, 0).is_none());
+        assert_eq!((mean.nights, mean.mean, mean.square_of_errors), (1.0, 1.0, 1.0));
+        // A difference of 4, with the error sqrt((1 + 9) / 2) of either night: 4 / sqrt(2) / sqrt(5).
+        let innovation = mean.update(&read, 1).unwrap().0;
+        assert!(is_near(innovation, 4.0 / 10f64.sqrt()), "{innovation}");
+        assert_eq!((mean.nights, mean.mean, mean.square_of_errors), (2.0, 3.0, 10.0));
+        assert!(mean.update(&read, 2).is_none() && mean.nights == 2.0);
+        // An error of 9 is less than twice sqrt((10 + 81) / 3) = 5.5.
+        assert!(is_near(mean.error(&read, 3), (91.0_f64 / 3.0).sqrt()));
+        assert_eq!(mean.innovation(&read, 3).map(|i| i.0), Some(0.0));
+    }
+
+    /// Lets a mean learn the first nights of a series.
+    fn learn(mean: &mut RunningMean, series: &Series, nights: usize) {
+        for night in 0..nights {
+            mean.update(series, night);
+        }
+    }
+
+    #[test]
+    fn an_unusual_error_counts_as_stated_and_a_least_one_is_a_millionth() {
+        // After 24 nights of 1, an error of 3 is more than twice sqrt((24 + 9) / 25) = 1.149, one of 2 less than 2 * 1.058.
+        let mut errors = vec![1.0; 24];
+        errors.extend([3.0, 2.0]);
+        let read = series(&errors, &[0.0; 26]);
+        let mut mean = RunningMean::default();
+        learn(&mut mean, &read, 24);
+        assert_eq!(mean.error(&read, 24), 3.0);
+        assert!(is_near(mean.error(&read, 25), (28.0_f64 / 25.0).sqrt()));
+        let exact = series(&[0.0; 3], &[50.0, -300.0, -100.0]);
+        let least = [0, 1, 2].map(|night| least_error(&exact, night));
+        assert!(is_near(least[0] / 1e-6, 150.0) && is_near(least[1] / 1e-6, 200.0), "{least:?}");
+        assert!(is_near(least[2] / 1e-6, 100.0) && RunningMean::default().error(&exact, 1) == least[1]);
+    }
+
+    #[test]
+    fn a_mean_follows_an_outlier_by_four_spreads_at_most() {
+        // Innovations of (1 - mean) sqrt(n / (n + 1)): the spread of the first seven nights is known.
+        let deviations = [0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1000.0];
+        let read = series(&[1.0; 8], &deviations);
+        let mut mean = RunningMean::default();
+        learn(&mut mean, &read, 7);
+        assert!(is_near(mean.mean, 0.0) && mean.spread.count == 6);
+        let most = 4.0 * (mean.spread.squares / 6.0).sqrt();
+        mean.update(&read, 7);
+        assert!(is_near(mean.mean, most / 8.0), "{} {most}", mean.mean);
+    }
+
+    #[test]
+    fn comparisons_of_a_case_pool_their_innovations() {
+        let [one, other] = [[0.0, 2.0, 1.0], [0.0, -2.0, 0.0]].map(|deviation| series(&[1.0; 3], &deviation));
+        let before = noise_of_comparisons(&[&one, &other], 3);
+        // The second night has innovations of 2 / sqrt(2) and -2 / sqrt(2).
+        assert_eq!([0, 1, 2].map(|night| before[night].spread.count), [0, 0, 2]);
+        assert!(is_near(before[2].spread.squares, 4.0));
+        // Each has a spread of sqrt(2): both pooled with one night more.
+        assert!(before[2].sample.sorted.iter().zip([-1.0, 1.0]).all(|(x, e)| is_near(*x, e)), "{:?}", before[2].sample);
+    }
+
+    #[test]
+    fn members_that_share_noise_let_their_sum_scatter_by_their_number() {
+        // Four members with the errors 1 on many nights: the same noise for all, or opposite noise for half.
+        let mut random = fastrand::Rng::with_seed(1);
+        let nights = 400;
+        let common: Vec<f64> = (0..nights).map(|_| luxproof_process::random::normal(&mut random)).collect();
+        let all: Vec<Series> = (0..4).map(|_| series(&vec![1.0; nights], &common)).collect();
+        let shared = expected_noise(&all.iter().collect::<Vec<_>>(), nights);
+        // No scatter about the mean of members: the whole variance of 1 is shared, and four add up to 4 * 1.
+        let last = shared[nights - 1].spread;
+        assert!(last.count == STATED_NIGHTS && is_near(last.squares, 40.0), "{last:?}");
+        let mut own = vec![];
+        for _ in 0..4 {
+            let deviation: Vec<f64> = (0..nights).map(|_| luxproof_process::random::normal(&mut random)).collect();
+            own.push(series(&vec![1.0; nights], &deviation));
+        }
+        let independent = expected_noise(&own.iter().collect::<Vec<_>>(), nights);
+        let last = independent[nights - 1].spread;
+        assert!(last.count == STATED_NIGHTS && (last.squares / 10.0 - 1.0).abs() < 0.15, "{last:?}");
+        assert!(!independent[nights - 1].has_heavy_members);
+        // Nothing is expected of a single member.
+        assert_eq!(expected_noise(&[&own[0]], nights)[nights - 1].spread.count, 0);
+    }
+
+    #[test]
+    fn members_that_repeat_exactly_are_expected_to_go_on() {
+        let mut deviation = vec![3.0; 8];
+        deviation[5] = 4.0;
+        let exact = series(&[0.0; 8], &deviation);
+        let counts: Vec<usize> = expected_noise(&[&exact], 8).iter().map(|noise| noise.spread.count).collect();
+        // Two nights show a repetition, and the sixth ends it.
+        assert_eq!(counts, [0, 0, 10, 10, 10, 10, 0, 0]);
+        assert_eq!(expected_noise(&[&exact], 8)[3].spread.squares, 0.0);
     }
 }

@@ -94,4 +94,54 @@ mod tests {
         let ratio = f64::from(nights) * SHARE_OF_WINDOW / 200.0 / f64::from(alarms);
         assert!((ratio - 1.0).abs() < 0.12, "{ratio}");
     }
+
+    /// The mean number of steps until a sum of normal numbers, less the reference value, exceeds a limit: by a Markov chain of its
+    /// values (D. Brook and D. A. Evans, Biometrika 59 (1972)).
+    fn steps_of_one_sum(limit: f64) -> f64 {
+        const STATES: usize = 60;
+        let (normal, width) = (Normal::standard(), 2.0 * limit / (2.0 * STATES as f64 - 1.0));
+        let mut transitions = vec![];
+        for from in 0..STATES {
+            let upto = (0..=STATES).map(|to| {
+                let edge = (to as f64 - 0.5 - from as f64) * width + REFERENCE_VALUE;
+                if to == 0 { 0.0 } else { normal.cdf(edge) }
+            });
+            let upto: Vec<f64> = upto.collect();
+            transitions.push(upto.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<f64>>());
+        }
+        let mut steps = vec![0.0; STATES];
+        for _ in 0..40_000 {
+            let next = transitions.iter().map(|row| 1.0 + row.iter().zip(&steps).map(|(p, s)| p * s).sum::<f64>());
+            steps = next.collect();
+        }
+        steps[0]
+    }
+
+    #[test]
+    fn each_limit_has_its_share_of_the_false_alarms() {
+        let limits = Limits::for_nights(100.0);
+        // Sums have a fifth: one alarm of either in 500 nights, and of one of them in 1000.
+        let steps = steps_of_one_sum(limits.sum);
+        // The approximation promises six per cent more.
+        assert!((930.0..1000.0).contains(&steps), "{} {steps}", limits.sum);
+        // Single nights have a twentieth: one in 2000 beyond 3.4808 on either side.
+        assert!((limits.night - 3.4808).abs() < 1e-4, "{}", limits.night);
+    }
+
+    #[test]
+    fn five_nights_exceed_their_limit_together_on_either_side() {
+        let limits = Limits { sum: 1.0, window: 2.0, night: 3.0 };
+        // 2 sqrt(5) = 4.4721.
+        for (last, is_exceeded) in [
+            (&[0.9; 5][..], true),
+            (&[-0.9; 5], true),
+            (&[0.89; 5], false),
+            (&[-0.89; 5], false),
+            (&[9.0; 4], false),
+            (&[5.0, 5.0, 0.0, -5.0, 0.0], true),
+            (&[5.0, 5.0, -5.0, -5.0, 0.0], false),
+        ] {
+            assert_eq!(limits.are_exceeded_by(last.iter().copied()), is_exceeded, "{last:?}");
+        }
+    }
 }

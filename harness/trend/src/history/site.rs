@@ -245,4 +245,89 @@ mod tests {
         let page = site(&history, &changes(&history), &[]);
         assert!(page.contains("&lt;b&gt;") && !page.contains("<b>"));
     }
+
+    /// A history of a night on which Mitsuba's meters have these verdicts.
+    fn night_of(verdicts: &[Verdict]) -> History {
+        let mut history = Synthetic { nights: 1, cases: 1, meters: verdicts.len(), ..Synthetic::default() }.history();
+        history.series.retain(|s| s.key.reading.engine == "mitsuba" && s.key.reading.procedure == PROCEDURE);
+        for (series, verdict) in history.series.iter_mut().zip(verdicts) {
+            series.verdicts = vec![Some(*verdict)];
+        }
+        history
+    }
+
+    #[test]
+    fn the_last_night_is_counted_by_verdict() {
+        let counts = [
+            (Verdict::Pass, 4),
+            (Verdict::Fail, 1),
+            (Verdict::UnexpectedPass, 1),
+            (Verdict::Missing, 1),
+            (Verdict::Undecided, 2),
+            (Verdict::KnownDeviation, 1),
+        ];
+        let verdicts: Vec<Verdict> = counts.iter().flat_map(|(verdict, n)| vec![*verdict; *n]).collect();
+        let row = verdict_table(&night_of(&verdicts)).into_string();
+        let cells = "<td class=\"number\">4</td><td class=\"number fail\">3</td><td class=\"number undecided\">2</td>\
+                     <td class=\"number known\">1</td>";
+        assert!(row.contains(cells), "{row}");
+        let quiet = verdict_table(&night_of(&[Verdict::Pass])).into_string();
+        assert!(!quiet.contains("number fail") && !quiet.contains("number undecided"), "{quiet}");
+        assert!(!quiet.contains("number known") && quiet.contains("<td class=\"number\">1</td>"), "{quiet}");
+        let mut dark = night_of(&[Verdict::Missing]);
+        dark.series[0].deviation[0] = f64::NAN;
+        assert!(verdict_table(&dark).into_string().contains("<td class=\"number\">–</td>"));
+        assert_eq!(verdict_table(&History::default()).into_string(), "");
+    }
+
+    fn change(level: Level, part: Part, seen_in: Vec<Part>, course: Course) -> Change {
+        let engine = "mitsuba".into();
+        Change { level, engine, procedure: PROCEDURE, part, night: 1, noticed: 2, course, seen_in }
+    }
+
+    fn part(case: &str, meter: Option<usize>) -> Part {
+        Part { case: Some(case.to_owned()), meter: meter.map(|k| luxproof_model::MeterId::new("desk", k)) }
+    }
+
+    const STEP: Course = Course::Step { standard_errors: 3.0, relative: 0.01 };
+
+    #[test]
+    fn a_change_names_its_group_and_the_groups_that_show_it_too() {
+        let seen = vec![part("b", None), part("a", None), part("a", Some(1)), part("a", Some(2)), part("b", None)];
+        let all = change(Level::EngineAndProcedure, Part::default(), seen.clone(), STEP);
+        assert_eq!(describe_place(&all), "all cases together; by themselves a, b; 2 single comparisons");
+        let alone = change(Level::EngineAndProcedure, Part::default(), vec![], STEP);
+        assert_eq!(describe_place(&alone), "all cases together");
+        // Within a case its name says enough.
+        let case = change(Level::Case, part("a", None), seen[..3].to_vec(), STEP);
+        assert_eq!(describe_place(&case), "a; 1 single comparison");
+        assert_eq!(describe_place(&change(Level::Comparison, part("a", Some(3)), vec![], STEP)), "a desk[3]");
+    }
+
+    #[test]
+    fn a_change_in_words_has_the_night_on_which_it_was_noticed_and_an_outlier_has_none() {
+        let history = History { nights: ["n0", "n1", "n2"].map(str::to_owned).to_vec(), ..History::default() };
+        let step = change(Level::Case, part("a", None), vec![], STEP);
+        assert_eq!(
+            in_words(&history, &step),
+            "mitsuba indirect_illuminance, a: changed by +1.0 % on n1, noticed on n2"
+        );
+        let course = Course::Outlier { standard_errors: 3.0, relative: 0.01 };
+        let outlier = Change { course, ..step };
+        assert_eq!(in_words(&history, &outlier), "mitsuba indirect_illuminance, a: had an outlier of +1.0 % on n1");
+    }
+
+    #[test]
+    fn a_version_belongs_to_a_change_of_its_engine_within_two_nights() {
+        let mut history = History::default();
+        let (from, to) = ("1.0".to_owned(), "1.1".to_owned());
+        let step = change(Level::Case, part("a", None), vec![], STEP);
+        for (engine, night, is_near) in [("mitsuba", 3, true), ("mitsuba", 4, false), ("other", 1, false)] {
+            let (from, to) = (from.clone(), to.clone());
+            history.version_changes =
+                vec![crate::history::series::VersionChange { engine: engine.into(), night, from, to }];
+            let text = is_near.then(|| "1.1 (was 1.0)".to_owned());
+            assert_eq!(describe_version(&history, &step), text, "{engine} {night}");
+        }
+    }
 }
