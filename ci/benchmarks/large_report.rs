@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use luxproof_model::{CaseRecord, ReadingRecord, Report, SpecRecord};
 use luxproof_model::{Comparison, Verdict};
-use luxproof_model::{MeterId, ProcedureId, Reading, ReadingKey, Recording};
+use luxproof_model::{Estimate, MeterId, ProcedureId, Reading, ReadingKey, Recording};
 use serde_json::json;
 
 const ENGINES: [&str; 5] = ["simulator", "mitsuba", "radiance", "povray", "an-adapter"];
@@ -109,12 +109,8 @@ fn synthetic(cases: usize, procedures: &[ProcedureId], meters: usize) -> Result<
                     report.summary.fail += 1;
                     c.diagnosis = Some("its flux is 1 % too large".into());
                 }
-                let reading = Reading {
-                    meter: c.meter.clone(),
-                    quantity: c.quantity,
-                    value: value * (1.0 + relative),
-                    uncertainty: c.uncertainty,
-                };
+                let estimate = Estimate { value: value * (1.0 + relative), uncertainty: c.uncertainty };
+                let reading = Reading::new(c.meter.clone(), c.quantity, estimate);
                 report.readings.push(ReadingRecord { key: key.clone(), model: c.model.clone(), reading });
                 report.comparisons.push(c);
             }

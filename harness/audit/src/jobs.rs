@@ -213,11 +213,10 @@ impl Running<'_> {
         };
         let was_read = failure.is_none() || !measurement.estimates.is_empty();
         let estimates = if was_read { measurement.readings(&task.targets) } else { vec![] };
-        let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
-            meter: target.id.clone(),
-            quantity: task.quantity,
-            value: estimate.value,
-            uncertainty: estimate.uncertainty,
+        let readings = estimates.into_iter().zip(measurement.quadratures(&task.targets)).zip(&task.targets);
+        let readings = readings.map(|((estimate, quadrature), target)| Reading {
+            quadrature,
+            ..Reading::new(target.id.clone(), task.quantity, estimate)
         });
         // A failed engine may have lost single meters only: the others have values.
         let readings = readings.filter(|reading| failure.is_none() || reading.value.is_finite());

@@ -49,8 +49,7 @@ fn version(readings: &RecordedReadings) -> String {
 fn recording(case: &Case, task: &Task, engine: &EngineName, readings: &RecordedReadings) -> Recording {
     let values = task.targets.iter().filter_map(|target| {
         let estimate = readings.value(&case.name, task.procedure, &target.id)?;
-        let (value, uncertainty) = (estimate.value, estimate.uncertainty);
-        Some(Reading { meter: target.id.clone(), quantity: task.quantity, value, uncertainty })
+        Some(Reading::new(target.id.clone(), task.quantity, estimate))
     });
     let source = (!readings.source.is_empty()).then(|| format!("recorded in {}", readings.source));
     Recording {

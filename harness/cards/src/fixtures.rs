@@ -1,8 +1,8 @@
 //! Reports that are made by hand, with known answers.
 
 use luxproof_model::{
-    Basis, CaseRecord, Comparison, HiddenVariant, ProcedureId, Reading, ReadingKey, Recording, Report, SpecRecord,
-    Verdict,
+    Basis, CaseRecord, Comparison, Estimate, HiddenVariant, ProcedureId, Reading, ReadingKey, Recording, Report,
+    SpecRecord, Verdict,
 };
 use serde_json::{Value, json};
 
@@ -148,12 +148,8 @@ pub(crate) fn report(engine: &str, version: &str, given: &[MadeCase]) -> Report 
         report.recordings.push(recording);
         for c in &case.points {
             let c = Comparison { key: key.clone(), ..c.clone() };
-            let reading = Reading {
-                meter: c.meter.clone(),
-                quantity: c.quantity,
-                value: c.value.unwrap_or(0.0),
-                uncertainty: c.uncertainty,
-            };
+            let estimate = Estimate { value: c.value.unwrap_or(0.0), uncertainty: c.uncertainty };
+            let reading = Reading::new(c.meter.clone(), c.quantity, estimate);
             report.readings.push(luxproof_model::ReadingRecord { key: key.clone(), model: c.model.clone(), reading });
             report.comparisons.push(c);
         }

@@ -495,11 +495,20 @@ impl Measurement {
     pub fn readings<'a>(&self, targets: impl IntoIterator<Item = &'a Target>) -> Vec<Estimate> {
         let targets: Vec<&Target> = targets.into_iter().collect();
         let weighted = targets.iter().zip(weights(&targets));
-        let reading = |(target, weights): (&&Target, Vec<(usize, f64)>)| {
-            let absolute_sum = weights.iter().map(|&(k, weight)| (weight * self.estimates[k].value).abs()).sum();
-            target.reading(self.weighted(&weights), absolute_sum)
-        };
-        weighted.map(reading).collect()
+        weighted.map(|(target, weights)| target.reading(self.weighted(&weights))).collect()
+    }
+
+    /// Returns the largest error that the sum of each target has as the quantity that it stands for: 0 of a single plane.
+    ///
+    /// It is relative to the sum of the absolute values of the terms.
+    pub fn quadratures<'a>(&self, targets: impl IntoIterator<Item = &'a Target>) -> Vec<f64> {
+        let targets: Vec<&Target> = targets.into_iter().collect();
+        let mut bounds = vec![];
+        for (target, weights) in targets.iter().zip(weights(&targets)) {
+            let terms = weights.iter().map(|&(k, weight)| (weight * self.estimates[k].value).abs());
+            bounds.push(if target.quadrature > 0.0 { target.quadrature * terms.sum::<f64>() } else { 0.0 });
+        }
+        bounds
     }
 
     /// Returns for each sampled part and block how far the readings of targets are from their means, see [`Blocks::deviates`].

@@ -208,8 +208,34 @@ pub struct Reading {
     pub quantity: Quantity,
     /// In the quantity's unit.
     pub value: f64,
+    /// The uncertainty of the planes that are added up.
     #[serde(flatten)]
     pub uncertainty: Uncertainty,
+    /// The largest error of that sum as the quantity, in its unit: 0 unless finitely many planes stand for a curved surface.
+    ///
+    /// Engines that read the same planes have the same error, so a comparison between them does not contain it.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub quadrature: f64,
+}
+
+/// Whether a field is left out.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+impl Reading {
+    /// A reading of the quantity itself, not of planes that stand for it.
+    pub const fn new(meter: MeterId, quantity: Quantity, estimate: Estimate) -> Self {
+        Self { meter, quantity, value: estimate.value, uncertainty: estimate.uncertainty, quadrature: 0.0 }
+    }
+
+    /// The value with its whole uncertainty.
+    pub fn estimate(&self) -> Estimate {
+        let uncertainty =
+            if self.quadrature > 0.0 { self.uncertainty.within(self.quadrature) } else { self.uncertainty };
+        Estimate { value: self.value, uncertainty }
+    }
 }
 
 /// The run of one engine in one procedure of one case, with everything that repeats it.

@@ -86,7 +86,7 @@ pub(super) fn rename_earlier(report: &Report, path: &Path) -> io::Result<Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use luxproof_model::{Light, MeterId, ProcedureId, Quantity, Reading, Recording, Uncertainty};
+    use luxproof_model::{Estimate, Light, MeterId, ProcedureId, Quantity, Reading, Recording};
     use luxproof_model::{REPORT_VERSION, ReadingRecord};
     use luxproof_process::files::Durability;
 
@@ -97,12 +97,7 @@ mod tests {
             report.readings.push(ReadingRecord {
                 key: ReadingKey::new("room", ProcedureId::DirectIlluminance, *engine),
                 model: "point".to_owned(),
-                reading: Reading {
-                    meter: MeterId::new("plane", 0),
-                    quantity: Quantity::Illuminance,
-                    value: 1.0,
-                    uncertainty: Uncertainty::Exact,
-                },
+                reading: Reading::new(MeterId::new("plane", 0), Quantity::Illuminance, Estimate::exact(1.0)),
             });
         }
         report

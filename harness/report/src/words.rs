@@ -16,16 +16,12 @@ pub(super) const LARGEST_ERROR_RULE: &str = "the largest error is that of the la
 pub(super) const HEADING: &str = "What each renderer can be trusted for, by this run";
 
 pub(super) fn value(reading: &Reading) -> String {
-    estimate(&reading_estimate(reading))
+    estimate(&reading.estimate())
 }
 
 /// A value with its uncertainty, both with the unit: `181.4 lx ± 1.2 lx`.
 pub(super) fn value_with_unit(reading: &Reading) -> String {
-    estimate_with_unit(&reading_estimate(reading), reading.quantity.unit())
-}
-
-fn reading_estimate(reading: &Reading) -> Estimate {
-    Estimate { value: reading.value, uncertainty: reading.uncertainty }
+    estimate_with_unit(&reading.estimate(), reading.quantity.unit())
 }
 
 /// An estimate with its expanded uncertainty in two digits: `181.4 ± 1.2`; six significant digits where none is stated.
@@ -188,7 +184,7 @@ mod tests {
             (0.0, Uncertainty::Exact, "0"),
         ] {
             let (meter, quantity) = (MeterId::new("m", 0), Quantity::Illuminance);
-            assert_eq!(value(&Reading { meter, quantity, value: number, uncertainty }), expected);
+            assert_eq!(value(&Reading::new(meter, quantity, Estimate { value: number, uncertainty })), expected);
         }
     }
 }

@@ -40,15 +40,11 @@ pub fn task(meters: usize) -> Task {
 
 /// What an engine says of such a task.
 pub fn recording(engine: &str, estimates: &[Estimate]) -> Recording {
-    let reading = |(k, estimate): (usize, &Estimate)| Reading {
-        meter: MeterId::new("grid", k),
-        quantity: Quantity::Illuminance,
-        value: estimate.value,
-        uncertainty: estimate.uncertainty,
-    };
     let role = if ["simulator", "iesna"].contains(&engine) { Role::Reference } else { Role::Renderer };
     let key = ReadingKey::new("c", ProcedureId::IndirectIlluminance, engine);
     let light = Light(Transport::Indirect(Bounces::Converged));
-    let readings = estimates.iter().enumerate().map(reading).collect();
+    let readings = estimates.iter().enumerate();
+    let readings =
+        readings.map(|(k, estimate)| Reading::new(MeterId::new("grid", k), Quantity::Illuminance, *estimate)).collect();
     Recording { role, model: "point".into(), readings, ..Recording::of(key, light) }
 }

@@ -203,9 +203,12 @@ impl Judge<'_> {
             .map(|s| self.tolerance_with_source(task, s.reference.basis, &recording.key.engine))
             .unwrap_or_default();
         let tail = upper_tail_of_normal(self.tolerances.coverage_factor());
-        let budget = reading.and(scored.as_ref()).map(|scored| {
+        let budget = reading.zip(scored.as_ref()).map(|(reading, scored)| {
             let mut components = uncertainty_components(&uncertainty);
             components.extend(scored.components.iter().copied());
+            // The same planes have the same error, which is not in their difference.
+            let quadrature = (reading.quadrature - scored.quadrature).abs();
+            components.extend((quadrature > 0.0).then(|| Component::within(Source::Discretisation, quadrature)));
             error_budget::budget_of_stage(components, tail, share_of_reading(recording, k))
         });
         let missing = match (reading, &scored) {
@@ -380,6 +383,8 @@ const ROUNDING: f64 = 1e-13;
 struct ScoredReference {
     reference: Reference,
     components: Vec<Component>,
+    /// As in [`Reading::quadrature`].
+    quadrature: f64,
 }
 
 impl ScoredReference {
@@ -396,13 +401,13 @@ impl ScoredReference {
         for component in &mut components {
             component.source = Source::Reference;
         }
-        Self { reference, components }
+        Self { reference, components, quadrature: reading.quadrature }
     }
 
     fn from_formula(value: f64, source: &str) -> Self {
         let bound = ROUNDING * value.abs();
         let reference = Reference::of(value, &Uncertainty::Bound(bound), Basis::ClosedForm, source.to_owned());
-        Self { reference, components: vec![Component::within(Source::Reference, bound)] }
+        Self { reference, components: vec![Component::within(Source::Reference, bound)], quadrature: 0.0 }
     }
 
     /// A printed or derived value, which does not rest on the photometric file.
@@ -417,7 +422,7 @@ impl ScoredReference {
         if let Some((input, reading)) = input.zip(reading) {
             components.push(Component::within(Source::Input, input.bound(target, reading.value)));
         }
-        Self { reference, components }
+        Self { reference, components, quadrature: 0.0 }
     }
 }
 

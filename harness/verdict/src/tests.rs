@@ -193,6 +193,19 @@ fn verdict_on_darkness(value: f64, bound: f64) -> Verdict {
 }
 
 #[test]
+fn the_error_of_the_same_sum_of_planes_is_in_no_comparison() {
+    for (of_reading, of_reference, expected) in [(0.47, 0.47, 0.0), (0.47, 0.0, 0.47), (0.0, 0.47, 0.47)] {
+        let mut exact = recording("simulator", &[Estimate::exact(100.0)]);
+        let mut subject = recording("radiance", &[Estimate::exact(100.6)]);
+        (exact.readings[0].quadrature, subject.readings[0].quadrature) = (of_reference, of_reading);
+        let comparison = &built_in().compare_one(&task(1), &subject, &[&exact, &subject])[0];
+        let budget = comparison.budget.as_ref().unwrap();
+        // The standard uncertainty of a rectangular distribution, JCGM 100:2008, 4.3.7.
+        assert!((budget.combined - expected / 3f64.sqrt()).abs() < 1e-12, "{budget:?}");
+    }
+}
+
+#[test]
 fn a_missing_reading_of_darkness_keeps_its_reason_without_a_tolerance() {
     let none = luxproof_spec::ToleranceOverride::default();
     let overrides = std::collections::BTreeMap::from([(luxproof_model::ProcedureId::IndirectIlluminance, none)]);

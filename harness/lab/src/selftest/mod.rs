@@ -13,7 +13,9 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::tables;
-use luxproof_model::{Comparison, EngineName, ProcedureId, Reading, ReadingKey, Recording, Uncertainty, Verdict};
+use luxproof_model::{
+    Comparison, EngineName, Estimate, ProcedureId, Reading, ReadingKey, Recording, Uncertainty, Verdict,
+};
 use luxproof_process::random::normal;
 use luxproof_spec::Case;
 use luxproof_spec::procedures::Task;
@@ -189,11 +191,9 @@ impl FaultBench {
     /// The recording of an engine that reads these values.
     fn make_recording(&self, model: &Model, engine: &str, values: &[f64], errors: &[f64]) -> Recording {
         let task = &model.task;
-        let readings = task.targets.iter().zip(values).zip(errors).map(|((target, value), error)| Reading {
-            meter: target.id.clone(),
-            quantity: task.quantity,
-            value: *value,
-            uncertainty: Uncertainty::sampled(*error, None),
+        let readings = task.targets.iter().zip(values).zip(errors).map(|((target, value), error)| {
+            let estimate = Estimate { value: *value, uncertainty: Uncertainty::sampled(*error, None) };
+            Reading::new(target.id.clone(), task.quantity, estimate)
         });
         Recording {
             model: task.model(),

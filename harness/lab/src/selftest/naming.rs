@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::SelftestError;
 use super::adapters::{self, AdapterFault, GROUPS};
 use luxproof_model::{
-    Comparison, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Uncertainty, Verdict,
+    Comparison, Estimate, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Uncertainty, Verdict,
 };
 use luxproof_process::random::normal;
 use luxproof_spec::Case;
@@ -361,11 +361,9 @@ fn is_near((value, error): (f64, f64), right: f64) -> bool {
 
 /// The recording of an engine that reads values with standard errors in a task.
 fn make_recording(task: &Task, engine: &str, values: &[(f64, f64)]) -> Recording {
-    let readings = task.targets.iter().zip(values).map(|(target, (value, error))| Reading {
-        meter: target.id.clone(),
-        quantity: task.quantity,
-        value: *value,
-        uncertainty: if *error == 0.0 { Uncertainty::Bound(0.0) } else { Uncertainty::sampled(*error, None) },
+    let readings = task.targets.iter().zip(values).map(|(target, (value, error))| {
+        let uncertainty = if *error == 0.0 { Uncertainty::Bound(0.0) } else { Uncertainty::sampled(*error, None) };
+        Reading::new(target.id.clone(), task.quantity, Estimate { value: *value, uncertainty })
     });
     Recording {
         model: task.model(),

@@ -9,7 +9,7 @@ use super::*;
 use crate::{Detail, Letters, Screen, Style};
 use luxproof_model::CaseRecord;
 use luxproof_model::Comparison;
-use luxproof_model::{MeterId, ProcedureId, Quantity, Reading, ReadingKey, ReadingRecord, Uncertainty};
+use luxproof_model::{Estimate, MeterId, ProcedureId, Quantity, Reading, ReadingKey, ReadingRecord};
 
 const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "radiance", "povray"];
 
@@ -118,7 +118,7 @@ fn every_view_has_the_time_limit_the_next_step_and_one_largest_error() {
 
 /// An exact reading at a point.
 fn reading_at(key: &ReadingKey, meter: MeterId) -> ReadingRecord {
-    let reading = Reading { meter, quantity: Quantity::Illuminance, value: 100.0, uncertainty: Uncertainty::Exact };
+    let reading = Reading::new(meter, Quantity::Illuminance, Estimate::exact(100.0));
     ReadingRecord { key: key.clone(), model: "point".to_owned(), reading }
 }
 

@@ -96,12 +96,9 @@ impl Target {
         }
     }
 
-    /// What is read, of the weighted sum of illuminances and of the sum of the absolute values of its terms.
-    pub fn reading(&self, sum: Estimate, absolute_sum: f64) -> Estimate {
-        self.made.of(match self.quadrature {
-            0.0 => sum,
-            relative => Estimate { uncertainty: sum.uncertainty.within(relative * absolute_sum), ..sum },
-        })
+    /// What is read, of the weighted sum of illuminances.
+    pub fn reading(&self, sum: Estimate) -> Estimate {
+        self.made.of(sum)
     }
 
     /// The illuminances that it needs, with their names: its own, or one a meter.

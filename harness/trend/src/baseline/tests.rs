@@ -13,12 +13,9 @@ use luxproof_process::random::normal;
 fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
     let mut readings = vec![];
     for (k, value) in values.iter().enumerate() {
-        readings.push(Reading {
-            meter: MeterId::new("plane", k),
-            quantity: Quantity::Illuminance,
-            value: *value,
-            uncertainty: std_error.map_or(Uncertainty::Exact, |e| Uncertainty::sampled(e, None)),
-        });
+        let uncertainty = std_error.map_or(Uncertainty::Exact, |e| Uncertainty::sampled(e, None));
+        let estimate = Estimate { value: *value, uncertainty };
+        readings.push(Reading::new(MeterId::new("plane", k), Quantity::Illuminance, estimate));
     }
     Entry {
         key: ReadingKey::new("room", ProcedureId::IndirectIlluminance, "radiance"),

@@ -6,7 +6,7 @@ use luxproof_scene::{Bounces, Transport};
 use super::*;
 use crate::fixtures::built_in;
 use luxproof_engines::fixtures;
-use luxproof_model::{MeterId, Quantity, Reading, ReadingKey, Recording, Uncertainty};
+use luxproof_model::{Estimate, MeterId, Quantity, Reading, ReadingKey, Recording, Uncertainty};
 use luxproof_spec::procedures::{Target, known};
 
 /// Four meters of case S1; a fit needs more.
@@ -62,8 +62,8 @@ fn judged_to(error: f64, task: &Task, read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<
 fn recording(task: &Task, engine: &str, values: &[f64], error: f64) -> Recording {
     let mut readings = vec![];
     for (target, value) in task.targets.iter().zip(values) {
-        let uncertainty = Uncertainty::sampled(error * value, None);
-        readings.push(Reading { meter: target.id.clone(), quantity: task.quantity, value: *value, uncertainty });
+        let estimate = Estimate { value: *value, uncertainty: Uncertainty::sampled(error * value, None) };
+        readings.push(Reading::new(target.id.clone(), task.quantity, estimate));
     }
     Recording { readings, ..Recording::of(ReadingKey::new("case", task.procedure, engine), task.light()) }
 }
