@@ -63,6 +63,13 @@ fn a_first_spec_takes_mounting_model_and_meters_from_the_file_and_the_room() {
     assert!(text.contains("at_m: [2.5, 2, 2.3]"), "{text}");
     let (text, _) = office("c.yaml", "point.ies", "9,1.8,2.8");
     assert!(text.contains("# point here: the file has no opening") && text.contains("margin_m: 0}"), "{text}");
+    // A recessed panel lies in the ceiling; one that shines upwards cannot.
+    let recessed = ["--photometry", "panel.ies", "--size", "5,4,2.8", "--yes", "--mounting", "recessed"];
+    folder.luxproof(&[&["init", "r.yaml"], &recessed[..]].concat()).exits(0);
+    let check = folder.luxproof(&["check", "r.yaml"]).exits(0);
+    let text = folder.read("r.yaml");
+    assert!(check.stderr.is_empty() && text.contains("at_m: [2.5, 2, 2.8]"), "{}{text}", check.stderr);
+    assert!(text.contains("    # face_reflectance: 0.8 "), "{text}");
     // What does not fit is refused, and nothing is written.
     let args = ["init", "d.yaml", "--photometry", "panel.ies", "--size", "0.5,4,3", "--yes"];
     let refusal = folder.luxproof(&args).exits(2).message();

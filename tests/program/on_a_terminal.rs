@@ -81,7 +81,8 @@ fn progress_shows_a_bar_and_what_runs_and_never_wraps() {
 #[test]
 fn init_asks_again_for_each_wrong_answer_and_keeps_the_others() {
     let folder = Folder::new(&[("mine.ies", LAMP), ("bad.ies", "IESNA:LM-63-2002\nTILT=NONE\nx\n")]);
-    let answers = "my office\n5,4\n5,4,0\n5,4,2.8\n20,50,70\n0.2,0.5,0.8\nnone.ies\nbad.ies\nmine.ies\n";
+    let answers =
+        "my office\n5,4\n5,4,0\n5,4,2.8\n20,50,70\n0.2,0.5,0.8\nnone.ies\nbad.ies\nmine.ies\nflush\n2.8\n0.5\n";
     let answer = on_terminal(&folder, 80, answers, &["init", "room/office.yaml"]).exits(0);
     for complaint in [
         "`5,4` is not three numbers, such as 6,4,3",
@@ -89,12 +90,16 @@ fn init_asks_again_for_each_wrong_answer_and_keeps_the_others() {
         "reflectances lie between 0 and 1; write 20 % as 0.2",
         "none.ies: the file cannot be read",
         "bad.ies:3",
+        "`flush` is neither `recessed` nor metres below the ceiling, such as 0.5",
+        "the room is only 2.8 m high",
         "next: luxproof run room/office.yaml",
     ] {
         assert!(answer.stdout.contains(complaint), "no `{complaint}` in {}", answer.stdout);
     }
     let text = folder.read("room/office.yaml");
-    for line in ["title: \"my office\"", "size_m: [5, 4, 2.8]", "floor: 0.2, walls: 0.5, ceiling: 0.8", "mine.ies"] {
+    for line in
+        ["title: \"my office\"", "size_m: [5, 4, 2.8]", "floor: 0.2, walls: 0.5, ceiling: 0.8", "2.3]", "mine.ies"]
+    {
         assert!(text.contains(line), "no `{line}` in {text}");
     }
     assert_eq!(folder.read("room/mine.ies"), LAMP);

@@ -154,6 +154,7 @@ fn text(scene: &Path, spec: &Path, imported: &Imported) -> String {
         photometry: Path::new(DOWNLIGHT),
         place: imported.place,
         model: None,
+        is_recessed: false,
         desk: desk_meters(imported),
     };
     with_luminaires(first.text(), &imported.luminaires)

@@ -26,6 +26,9 @@ const OBSTACLES: &str = "
 #   - box: {min_m: [1, 1, 0], max_m: [2.6, 1.8, 0.7], reflectance: 0.5}
 ";
 
+const MOUNTING_QUESTION: &str =
+    "Is the luminaire `recessed`, or how many metres below the ceiling (empty: by its file)?";
+
 /// The height of desks in EN 12464-1.
 const DESK_HEIGHT_M: f64 = 0.75;
 /// Meters lie at most at this part of the room's height.
@@ -63,12 +66,39 @@ pub(super) struct InitArgs {
     /// The mounting height, the model and the meters follow from the file and the room.
     #[arg(long, value_name = "FILE")]
     photometry: Option<PathBuf>,
+    /// `recessed` in the ceiling, or metres from the ceiling down to the photometric centre [default: by the file]
+    #[arg(long, value_name = "recessed|METRES")]
+    mounting: Option<Mounting>,
     /// Ask no questions; use defaults
     #[arg(long)]
     yes: bool,
     /// Replace existing files
     #[arg(long)]
     force: bool,
+}
+
+/// Where the luminaire is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mounting {
+    /// As the file suggests: a luminaire that shines upwards hangs, any other is below the ceiling.
+    ByFile,
+    /// In the plane of the ceiling.
+    Recessed,
+    /// So many metres below the ceiling.
+    Below(f64),
+}
+
+impl FromStr for Mounting {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.parse()) {
+            ("", _) => Ok(Self::ByFile),
+            ("recessed", _) => Ok(Self::Recessed),
+            (_, Ok(drop_m)) if f64::is_finite(drop_m) && drop_m > 0.0 => Ok(Self::Below(drop_m)),
+            _ => Err(format!("`{text}` is neither `recessed` nor metres below the ceiling, such as 0.5")),
+        }
+    }
 }
 
 /// The lengths of a room along x, y and z, in metres.
@@ -140,7 +170,13 @@ pub(super) fn init(args: &InitArgs) -> Result<Exit, Diagnostic> {
         None => made_up_luminaire(size, args)?,
     };
     fits(&luminaire, size).map_err(|error| miette::miette!("{error}"))?;
-    let text = spec(&args.spec, &title, size, reflectance, &luminaire)?;
+    let text = match args.mounting {
+        None if asks => ask(MOUNTING_QUESTION, "", |mounting| {
+            let text = spec(&args.spec, &title, (size, reflectance), &luminaire, mounting.parse()?);
+            text.map_err(|error| format!("{error:?}"))
+        })?,
+        mounting => spec(&args.spec, &title, (size, reflectance), &luminaire, mounting.unwrap_or(Mounting::ByFile))?,
+    };
     let folder = folder_of(&args.spec);
     if !folder.as_os_str().is_empty() {
         std::fs::create_dir_all(&folder).into_diagnostic().wrap_err_with(|| folder.display().to_string())?;
@@ -288,23 +324,31 @@ fn drop_m(photometry: &Photometry, height_m: f64) -> f64 {
     usual_m.min(MAX_DROP_PART * height_m).max(0.51 * opening_m)
 }
 
-/// The spec's text: one luminaire below the middle of the ceiling.
+/// The spec's text: one luminaire at the middle of the ceiling or below it.
 fn spec(
     path: &Path,
     title: &str,
-    [x, y, z]: [f64; 3],
-    [floor, each_wall, ceiling]: [f64; 3],
+    ([x, y, z], [floor, each_wall, ceiling]): ([f64; 3], [f64; 3]),
     luminaire: &ChosenLuminaire,
+    mounting: Mounting,
 ) -> Result<String, Diagnostic> {
     let size_m = DVec3::new(x, y, z);
     let room = box_room(
         size_m.to_array().map(|extent| trimmed(extent, 4)),
         [trimmed(floor, 4), walls([each_wall; 4], |rho| trimmed(rho, 4)), trimmed(ceiling, 4)],
     );
-    let (drop_m, desk) = match &luminaire.photometry {
+    let (usual_drop_m, desk) = match &luminaire.photometry {
         Some(photometry) => (drop_m(photometry, z), desk_by_en_12464([x, y, z])),
         None => ((MAX_DROP_PART * z).min(0.3), DeskMeters::Coarse),
     };
+    let drop_m = match mounting {
+        Mounting::ByFile => usual_drop_m,
+        Mounting::Recessed => 0.0,
+        Mounting::Below(drop_m) => drop_m,
+    };
+    if drop_m >= z {
+        return Err(miette::miette!("--mounting {drop_m}: the room is only {z} m high"));
+    }
     let lamp_m = DVec3::new(x / 2.0, y / 2.0, z - drop_m);
     let first = First {
         about: ABOUT,
@@ -315,12 +359,13 @@ fn spec(
         photometry: &luminaire.name,
         place: Place { lamp_m, low_m: DVec3::ZERO, high_m: size_m },
         model: None,
+        is_recessed: mounting == Mounting::Recessed,
         desk,
     };
-    match &luminaire.photometry {
-        Some(_) => Ok(First { model: Some(model_by_file(&first, &luminaire.bytes)?), ..first }.text()),
-        None => Ok(first.text()),
-    }
+    // Whatever is wrong with the spec shows before a file is written.
+    let model = model_by_file(&first, &luminaire.bytes)?;
+    let model = luminaire.photometry.as_ref().map(|_| model);
+    Ok(First { model, ..first }.text())
 }
 
 /// Meters at desk height as fine as EN 12464-1 requires, with its margin where the room is wide enough.

@@ -27,6 +27,8 @@ pub(super) struct First<'a> {
     pub(super) place: Place,
     /// Why `model: auto` chooses its model here; without it, the template leaves the model out.
     pub(super) model: Option<String>,
+    /// Whether the luminaire lies in the plane of the ceiling.
+    pub(super) is_recessed: bool,
     pub(super) desk: DeskMeters,
 }
 
@@ -88,6 +90,7 @@ impl First<'_> {
             ("cz", number(lamp_m.z)),
             ("desk", self.desk.text(self.place)),
             ("model", self.model.as_ref().map_or_else(|| NO_MODEL.to_owned(), |why| model_line(why))),
+            ("face", if self.is_recessed { FACE } else { "" }.to_owned()),
             ("distance", "10".to_owned()),
             ("obstacles", self.obstacles.to_owned()),
             ("file", file),
@@ -101,6 +104,10 @@ impl First<'_> {
 
 /// The template's line where it leaves the model out.
 const NO_MODEL: &str = "# model: point                           # a point instead of the file's luminous opening";
+
+/// The template's line on the face of a luminaire in the ceiling.
+const FACE: &str =
+    "\n    # face_reflectance: 0.8                  # of its face, 0 by default; changes reflected light by per cents";
 
 /// The template's line for `model: auto`, with the reason for its choice.
 fn model_line(why: &str) -> String {
