@@ -103,22 +103,23 @@ impl Reads {
         match self {
             Self::Illuminance => Some(Parts::of_one(meter, 1.0)),
             Self::AllAround => {
-                let (aspects, quadrature) = all_around(meter);
+                let (aspects, quadrature) = all_around(meter, 0.0);
                 Some(Parts { aspects, quadrature, made: ReadingKind::Sum })
             }
             Self::Semicylinder => {
                 let facing = horizontal(meter.normal)?;
-                let (mut aspects, quadrature) = all_around(meter);
+                // The first direction is the one faced: POV-Ray can read meters that are parallel, but not nearly so.
+                let (mut aspects, quadrature) = all_around(meter, facing.y.atan2(facing.x));
                 aspects.extend(difference(meter, facing, 1.0 / PI));
                 Some(Parts { aspects, quadrature, made: ReadingKind::Sum })
             }
             Self::Hemisphere => {
-                let (mut aspects, quadrature) = all_over(meter);
+                let (mut aspects, quadrature) = all_over(meter, apart_from(meter.normal));
                 aspects.extend(difference(meter, meter.normal, 0.25));
                 Some(Parts { aspects, quadrature, made: ReadingKind::Sum })
             }
             Self::Sphere => {
-                let (aspects, quadrature) = all_over(meter);
+                let (aspects, quadrature) = all_over(meter, 0.0);
                 Some(Parts { aspects, quadrature, made: ReadingKind::Sum })
             }
             Self::Luminance => Some(Parts::of_one(meter, seen.reflectance? / PI)),
@@ -144,15 +145,15 @@ impl Parts {
 /// Directions of the mean all around: odd, so that its error is that of twice as many.
 const DIRECTIONS: u32 = 31;
 
-/// The mean over all vertical directions, by the rectangle rule.
+/// The mean over all vertical directions from an azimuth on, by the rectangle rule.
 ///
 /// A surface that turns once sees each bit of light as the positive part of a cosine, whose even harmonics 2k are
 /// 2 / (4 k^2 - 1) of its mean and whose odd ones but the first are none. An odd number N of directions takes the harmonics 2 N j for
 /// the mean: it is off by 2 / (4 N^2 j^2 - 1) of it, summed over j, at most, whatever the light, since all light is positive. The sum is
 /// 1 - x cot x with x = pi / 2N.
-fn all_around(meter: Meter) -> (Vec<Aspect>, f64) {
+fn all_around(meter: Meter, first: f64) -> (Vec<Aspect>, f64) {
     let aspects = (0..DIRECTIONS).map(|k| {
-        let azimuth = 2.0 * PI * f64::from(k) / f64::from(DIRECTIONS);
+        let azimuth = first + 2.0 * PI * f64::from(k) / f64::from(DIRECTIONS);
         let normal = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
         Aspect { meter: Meter { normal, ..meter }, weight: 1.0 / f64::from(DIRECTIONS) }
     });
@@ -198,18 +199,30 @@ const RINGS: [Ring; 6] = [
 /// The largest relative error of the mean over [`RINGS`], for light from any direction. A test computes it.
 const RINGS_ERROR: f64 = 4.7e-3;
 
-/// The mean over all directions.
+/// The azimuth by which to turn [`RINGS`] so that no direction is near a normal or its opposite: halfway between the directions of
+/// the ring at the same height.
+fn apart_from(normal: DVec3) -> f64 {
+    let nearest = RINGS.iter().min_by(|a, b| {
+        let [a, b] = [a, b].map(|ring| (ring.z.abs() - normal.z.abs()).abs());
+        a.total_cmp(&b)
+    });
+    let Some(ring) = nearest else { return 0.0 };
+    let facing = if ring.z * normal.z < 0.0 { -normal } else { normal };
+    facing.y.atan2(facing.x) - 2.0 * PI * (ring.turn + 0.5) / f64::from(ring.directions)
+}
+
+/// The mean over all directions, of rings that are turned by an azimuth.
 ///
 /// Light from a direction s counts the positive part of n s in the illuminance of a surface with the normal n, which is
 /// (n s + |n s|) / 2. The first part adds up to nothing, by a last pair of directions. The second is the same for n and
 /// -n, so that directions of one half space suffice; each ring is on one side of the horizon. As the weighted sum of |n s|
 /// is linear between the planes n s = 0, its extremes are at the lines where two of them meet and within the cells around.
-fn all_over(meter: Meter) -> (Vec<Aspect>, f64) {
+fn all_over(meter: Meter, first: f64) -> (Vec<Aspect>, f64) {
     let mut aspects = vec![];
     for Ring { z, directions, turn, weight } in RINGS {
         let across = (1.0 - z * z).sqrt();
         for k in 0..directions {
-            let azimuth = 2.0 * PI * (f64::from(k) + turn) / f64::from(directions);
+            let azimuth = first + 2.0 * PI * (f64::from(k) + turn) / f64::from(directions);
             let normal = DVec3::new(across * azimuth.cos(), across * azimuth.sin(), z).normalize();
             aspects.push(Aspect { meter: Meter { normal, ..meter }, weight: weight / f64::from(directions) });
         }
@@ -254,7 +267,7 @@ mod tests {
     #[test]
     fn the_mean_all_around_is_off_by_its_bound_at_most_and_nearly_reaches_it() {
         let meter = Meter { position_m: DVec3::ZERO, normal: DVec3::Z };
-        let (aspects, bound) = all_around(meter);
+        let (aspects, bound) = all_around(meter, 0.0);
         let directions = (0..100_000).map(|k| DVec2::from_angle(f64::from(k) * 1e-4).extend(0.0));
         let offs = directions.map(|towards_light| {
             let mean: f64 = aspects.iter().map(|a| a.weight * a.meter.normal.dot(towards_light).max(0.0)).sum();
@@ -273,7 +286,7 @@ mod tests {
     #[test]
     fn the_mean_over_the_sphere_is_off_by_its_bound_at_most() {
         let meter = Meter { position_m: DVec3::ZERO, normal: DVec3::Z };
-        let (aspects, bound) = all_over(meter);
+        let (aspects, bound) = all_over(meter, 0.0);
         let lean: DVec3 = aspects.iter().map(|a| a.weight * a.meter.normal).sum();
         assert!(lean.length() < 1e-12, "{lean}");
         let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
@@ -326,6 +339,27 @@ mod tests {
             assert!((found - half).abs() <= hemisphere.quadrature / 4.0 + 1e-12, "{light}: {found} {half}");
         }
         assert!(Reads::Semicylinder.parts(Meter { normal: DVec3::Z, ..meter }, seen).is_none());
+    }
+
+    #[test]
+    fn planes_at_a_meter_are_parallel_or_a_few_degrees_apart_whatever_its_normal() {
+        let seen = MeterContext { reflectance: None, glare: None, opening: None };
+        for k in 0..500 {
+            // Not within 5 degrees of the vertical, where a normal and the vertical pair are near each other.
+            let (z, azimuth) = (0.996 * (2.0 * f64::from(k) / 499.0 - 1.0), 2.399_963 * f64::from(k));
+            let across = (1.0 - z * z).sqrt();
+            let normal = DVec3::new(across * azimuth.cos(), across * azimuth.sin(), z);
+            for reads in [Reads::Semicylinder, Reads::Hemisphere] {
+                let parts = reads.parts(Meter { position_m: DVec3::ZERO, normal }, seen).unwrap();
+                for (i, a) in parts.aspects.iter().enumerate() {
+                    for b in &parts.aspects[i + 1..] {
+                        let (sine, cosine) =
+                            (a.meter.normal.cross(b.meter.normal).length(), a.meter.normal.dot(b.meter.normal));
+                        assert!(cosine < 0.0 || sine < 1e-9 || sine > 0.05, "{reads:?} {normal}: {sine}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]
