@@ -8,6 +8,8 @@
 //! cannot choose its own weight. A stage that the time limit cut short weighs less, by its share of finished blocks.
 //! It counts only where it makes the interval narrower than it was, whatever the values are. So a reading never becomes
 //! worse by a stage that was cut, and is not chosen by its value.
+//! An engine that meets no light stops at its fewest samples, because nothing varies. Such a stage weighs as much less
+//! as it did less than it was granted.
 //! Seconds are those that engines count, so that results do not depend on the clock; user programs count none.
 //! Alpha spending over the planned stages keeps the error rate ([`luxproof_verdict::ERROR_SHARE_PER_STAGE`]).
 
@@ -133,10 +135,13 @@ pub fn sample_until_decided(
         subject.skewness = measurement.skewness().or(subject.skewness);
         subject.effort.extend(measurement.effort.iter().map(|(k, v)| (format!("stage{stage}_{k}"), v.clone())));
         let estimates = measurement.readings(request.targets.iter().map(|k| &task.targets[*k]));
-        let effective_weight = if ignores_budget { 1.0 } else { weight * measurement.cut_to.unwrap_or(1.0) };
+        let full_weight = if ignores_budget { 1.0 } else { weight * measurement.cut_to.unwrap_or(1.0) };
+        let done = (measurement.work_s.unwrap_or(cost.wall_s) / request.budget.seconds).min(1.0);
         let mut left_out = 0;
         for (&k, estimate) in request.targets.iter().zip(&estimates) {
             let reading = &mut subject.readings[k];
+            let is_stopped_early = !ignores_budget && met_nothing(estimate) && reading.value != 0.0;
+            let effective_weight = if is_stopped_early { full_weight.min(weight * done) } else { full_weight };
             if measurement.cut_to.is_some()
                 && widens(reading.uncertainty, weights[k], estimate.uncertainty, effective_weight)
             {
@@ -203,6 +208,12 @@ fn stage_weight(stage: u32, coarser: f64) -> f64 {
 /// The effort of all stages up to this one, where all planned stages take `total`.
 fn cumulative_effort(stage: u32, total: f64) -> f64 {
     total.powf((f64::from(stage - 1) / f64::from(MAX_STAGES - 1)).powf(EFFORT_GROWTH_EXPONENT))
+}
+
+/// Whether no sample met any light, so that nothing varied.
+fn met_nothing(estimate: &Estimate) -> bool {
+    let is_sampled = estimate.uncertainty == Uncertainty::NotSeen || estimate.uncertainty.standard_error() == Some(0.0);
+    estimate.value == 0.0 && is_sampled
 }
 
 /// Adds the estimate of a stage to a reading, with weights that were fixed in advance.
@@ -560,6 +571,35 @@ mod tests {
         // 1 % is allowed; its standard deviation over so many runs is 0.07 %.
         assert!((RUNS / 20..19 * RUNS / 20).contains(&left_out), "{left_out}");
         assert!(missed as f64 / (RUNS as f64) < 0.012, "{missed}");
+    }
+
+    #[test]
+    fn a_stage_that_met_no_light_weighs_what_it_did_of_its_grant() {
+        // A point sees a sliver of a large luminaire: one sample in forty meets it. Eight samples meet nothing.
+        let first = Estimate { value: 1.0, uncertainty: Uncertainty::sampled(0.03, Some(20_000.0)) };
+        for nothing in [Uncertainty::sampled(0.0, Some(3.7)), Uncertainty::NotSeen] {
+            let dark = Estimate { value: 0.0, uncertainty: nothing };
+            let stopped = reading_after_stages(first, dark, |_| 1e-4);
+            assert!((stopped.value - 1.0).abs() < 1e-3, "{stopped:?}");
+            assert!((stopped.uncertainty.standard() - 0.03).abs() < 1e-3, "{stopped:?}");
+            // Who takes all that was granted and meets nothing counts in full.
+            let searched = reading_after_stages(first, dark, |granted_s| granted_s);
+            assert!(searched.value < 0.5, "{searched:?}");
+        }
+    }
+
+    /// The reading of a meter after a first stage and further equal ones, which use `work_s` of the granted seconds.
+    fn reading_after_stages(first: Estimate, further: Estimate, work_s: fn(f64) -> f64) -> Reading {
+        let exact = recording("simulator", &[Estimate::exact(1.0)]);
+        let mut subject = recording("radiance", &[first]);
+        subject.work_s = Some(1.0);
+        let budgets = (budget_of(1.0), budget_of(100.0));
+        sample_until_decided(&built_in(), &task(1), &[&exact], &mut subject, budgets, &mut |request| {
+            let (estimates, work_s) = (vec![further], Some(work_s(request.budget.seconds)));
+            Ok((Measurement { estimates, work_s, ..Measurement::default() }, Cost::default()))
+        });
+        assert!(subject.stages[0] > 1, "{subject:?}");
+        subject.readings.remove(0)
     }
 
     /// The reading of a meter after a first and a second stage, each with the part that the time limit left of it.

@@ -79,6 +79,11 @@ impl Blocks {
         all
     }
 
+    /// Returns whether no block met any light at any sensor.
+    fn are_dark(&self) -> bool {
+        self.0.iter().flatten().all(|lx| *lx == 0.0)
+    }
+
     fn sensors(&self) -> Range<usize> {
         0..self.0.first().map_or(0, Vec::len)
     }
@@ -224,6 +229,11 @@ fn skewness_deviate(skewness: f64, count: usize) -> f64 {
 /// clock decides only if that is not enough.
 const PLANNED_TIME_SHARE: f64 = 0.6;
 
+/// The part of the seconds that blocks may take, and how many there may be, as long as none met any light. A sensor that sees a
+/// sliver of a large opening meets it in one sample of a few hundred, and eight without light say nothing.
+const DARK_TIME_SHARE: f64 = 0.1;
+const MAX_DARK_BLOCKS: usize = 1024;
+
 /// The part of the seconds for direct light if both parts of the light are sampled: reflected light takes longer.
 pub(super) const DIRECT_SHARE: f64 = 0.3;
 
@@ -326,6 +336,12 @@ impl Sampling<'_> {
         ((self.seconds / self.block_s) as usize).min(self.max_blocks).max(self.min_blocks)
     }
 
+    /// Returns how many blocks may go on searching for light where none has met any.
+    fn dark_blocks(&self) -> usize {
+        ((DARK_TIME_SHARE * self.seconds / self.block_s) as usize)
+            .clamp(self.enough_blocks, MAX_DARK_BLOCKS.max(self.enough_blocks))
+    }
+
     /// Returns how many blocks the next wave may have by the clock.
     fn blocks_in_time(&self, have: usize, waves: Waves) -> usize {
         let left = self.until.saturating_duration_since(Instant::now()).as_secs_f64();
@@ -360,7 +376,9 @@ impl Sampling<'_> {
             return first_wave - have;
         }
         let excess = blocks.worst_error(self.known_lx) / self.relative_error;
-        let missing = if have < self.enough_blocks {
+        let missing = if blocks.are_dark() {
+            self.dark_blocks().saturating_sub(have)
+        } else if have < self.enough_blocks {
             let sufficient = (have..self.enough_blocks).find(|n| is_narrow_with(*n, have, excess));
             match sufficient {
                 Some(sufficient) if sufficient == have => 0,
@@ -490,6 +508,25 @@ mod tests {
     /// Returns a block of two sensors that are normal about 1 with a standard deviation of 0.02.
     fn normal_block(random: &mut fastrand::Rng) -> Vec<f64> {
         (0..2).map(|_| 1.0 + 0.02 * luxproof_process::random::normal(random)).collect()
+    }
+
+    /// One block in forty meets light, 1 lx in the mean.
+    fn sliver_block(number: usize) -> Vec<f64> {
+        vec![if number % 40 == 39 { 40.0 } else { 0.0 }]
+    }
+
+    /// The number of blocks of one second each in a dark room.
+    fn dark_blocks(seconds: f64) -> usize {
+        let rule = Sampling::within(budget(0.1, seconds), 1.0, later());
+        rule.run(|numbers| Ok(numbers.map(|_| vec![0.0]).collect())).unwrap().blocks.count()
+    }
+
+    #[test]
+    fn light_that_few_blocks_meet_is_searched_for_within_a_share_of_the_time() {
+        let rule = Sampling::within(budget(0.1, 1e4), 1.0, later());
+        let found = rule.run(|numbers| Ok(numbers.map(sliver_block).collect())).unwrap();
+        assert!(found.blocks.count() > 40 && found.blocks.estimates()[0].value > 0.5, "{}", found.blocks.count());
+        assert_eq!([dark_blocks(1e4), dark_blocks(1e6), dark_blocks(10.0)], [1000, 1024, MIN_BLOCKS]);
     }
 
     #[test]
