@@ -128,3 +128,72 @@ fn find_exchanged_meters(scene: &Scene) -> Option<String> {
 fn sort_indices(values: &[f64]) -> Vec<usize> {
     (0..values.len()).sorted_by(|a, b| values[*a].total_cmp(&values[*b])).collect_vec()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    fn scene(procedure: ProcedureId, read: &[f64], right: &[f64]) -> Scene {
+        Scene { procedure, read: read.to_vec(), right: right.to_vec() }
+    }
+
+    const DIRECT: ProcedureId = ProcedureId::DirectIlluminance;
+    const TOTAL: ProcedureId = ProcedureId::TotalIlluminance;
+
+    #[test]
+    fn readings_of_other_meters_are_named() {
+        let right = [10.0, 20.0, 30.0, 40.0, 50.0];
+        let swapped = scene(DIRECT, &[20.0, 10.0, 30.02, 40.0, 50.0], &right);
+        assert_eq!(
+            find_exchanged_meters(&swapped).unwrap(),
+            "readings are given to other meters than they are of, in `direct_illuminance`: [0] reads what [1] should, [1] reads what [0] should"
+        );
+        let turned = scene(DIRECT, &[50.0, 40.0, 30.0, 20.0, 10.0], &right);
+        let text = find_exchanged_meters(&turned).unwrap();
+        assert!(text.ends_with(
+            "[0] reads what [4] should, [1] reads what [3] should, [3] reads what [1] should, and so 1 more"
+        ));
+        // Right readings, one wrong reading, values that no meter has, and few meters show none.
+        for (read, right) in [
+            (&right[..], &right[..]),
+            (&[20.0, 20.0, 30.0, 40.0, 50.0], &right),
+            (&[20.2, 10.0, 30.0, 40.0, 50.0], &right),
+            (&[20.0, 10.0, 30.0], &right[..3]),
+            // Equal right values tell nothing.
+            (&[10.0, 10.0, 10.0, 20.0, 10.0], &[10.0, 10.0, 10.0, 10.0, 20.0]),
+        ] {
+            assert_eq!(find_exchanged_meters(&scene(DIRECT, read, right)), None, "{read:?}");
+        }
+    }
+
+    #[test]
+    fn readings_of_another_job_are_named() {
+        let (one, other) = ([10.0, 20.0, 30.0, 40.0], [15.0, 25.0, 35.0, 45.0]);
+        let scenes = [scene(DIRECT, &other, &one), scene(TOTAL, &other, &other)];
+        let text = "the job `direct_illuminance` is answered with the readings of `total_illuminance`";
+        assert_eq!(find_exchanged_scene(&scenes[0], &scenes).unwrap(), text);
+        assert_eq!(find_exchanged_scene(&scenes[1], &scenes), None);
+        // A fifth of a percent from the other is near, and one meter that differs is no other job.
+        let near = other.map(|value| 1.0019 * value);
+        assert!(are_exchanged(&near, &other, &one));
+        assert!(!are_exchanged(&other.map(|value| 1.0021 * value), &other, &one));
+        assert!(!are_exchanged(&one, &one, &[10.0, 20.0, 30.0, 41.0]));
+        assert!(are_exchanged(&one, &one, &[10.0, 20.0, 31.0, 41.0]));
+    }
+
+    #[test]
+    fn a_batch_that_is_moved_by_a_meter_is_named_in_all_of_its_jobs() {
+        let scenes = [
+            scene(DIRECT, &[20.0, 30.0, 40.0], &[10.0, 20.0, 30.0]),
+            scene(TOTAL, &[50.0, 60.0, 10.0], &[40.0, 50.0, 60.0]),
+        ];
+        let found = find_batch_shift(&scenes);
+        assert_eq!(found.iter().map(|(procedure, _)| *procedure).collect_vec(), [DIRECT, TOTAL]);
+        assert!(found[0].1.starts_with("every meter reads what the next should"), "{found:?}");
+        let back = [
+            scene(DIRECT, &[60.0, 10.0, 20.0], &[10.0, 20.0, 30.0]),
+            scene(TOTAL, &[30.0, 40.0, 50.0], &[40.0, 50.0, 60.0]),
+        ];
+        assert!(find_batch_shift(&back)[0].1.contains("what the one before should"));
+        assert!(find_batch_shift(&scenes[..1]).is_empty() && find_batch_shift(&[]).is_empty());
+    }
+}

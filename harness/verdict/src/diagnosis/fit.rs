@@ -150,3 +150,72 @@ fn solve(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Option<Vec<f64>> {
     }
     right.iter().all(|x| x.is_finite()).then_some(right)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    const X: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
+    const Y: [f64; 4] = [0.0, 1.0, 1.0, 2.0];
+
+    /// Two parameters from 0 that may be anything up to a limit.
+    fn parameters(most: f64) -> [Parameter; 2] {
+        [Parameter::new("", 0.0, 0.01, (-10.0, 10.0)), Parameter::new("", 0.0, 0.01, (-10.0, most))]
+    }
+
+    /// The residuals of a straight line.
+    fn line(p: &[f64]) -> Vec<f64> {
+        X.iter().zip(Y).map(|(x, y)| p[0] + p[1] * x - y).collect()
+    }
+
+    #[test]
+    fn a_straight_line_is_fitted_with_its_errors_and_its_residual() {
+        // By hand: slope 3 / 5 and level .1, residuals of .1, .3, .3 and .1; the inverse of (4, 6; 6, 14) is (14, -6; -6, 4) / 20.
+        let found = fit(&parameters(10.0), &[5.0, -3.0], &mut |p| Some(line(p))).unwrap();
+        let [(level, of_level), (slope, of_slope)] = found.parameters[..] else { panic!("{found:?}") };
+        assert!((level - 0.1).abs() < 1e-4 && (slope - 0.6).abs() < 1e-4, "{found:?}");
+        assert!((of_level - 0.7_f64.sqrt()).abs() < 1e-6 && (of_slope - 0.2_f64.sqrt()).abs() < 1e-6, "{found:?}");
+        assert!((found.chi_squared - 0.2).abs() < 1e-6, "{found:?}");
+        assert_eq!(found.values(), [level, slope]);
+    }
+
+    #[test]
+    fn a_fit_stays_within_its_ranges_and_needs_residuals() {
+        let bounded = fit(&parameters(0.5), &[0.0, 0.5], &mut |p| Some(line(p))).unwrap();
+        assert!(bounded.values()[1] <= 0.5 && bounded.chi_squared >= 0.2, "{bounded:?}");
+        assert_eq!(fit(&parameters(10.0), &[0.0, 0.0], &mut |_| None), None);
+        // Readings that do not depend on a parameter leave it open.
+        assert_eq!(fit(&parameters(10.0), &[0.0, 0.0], &mut |p| Some(vec![p[0] - 1.0, p[0]])), None);
+    }
+
+    #[test]
+    fn a_power_is_found_step_by_step() {
+        let one = [Parameter::new("", 1.0, 0.02, (0.1, 10.0))];
+        let readings = [0.1_f64, 0.4, 0.7].map(|x| x.powf(2.2));
+        let mut residuals = |p: &[f64]| {
+            Some([0.1_f64, 0.4, 0.7].iter().zip(readings).map(|(x, y)| (x.powf(p[0]) - y) / 1e-3).collect())
+        };
+        let found = fit(&one, &[1.0], &mut residuals).unwrap();
+        assert!((found.values()[0] - 2.2).abs() < 1e-3 && found.chi_squared < 0.1, "{found:?}");
+    }
+
+    #[test]
+    fn a_slope_at_the_end_of_a_range_is_that_of_the_other_side() {
+        let one = [Parameter::new("", 1.0, 0.25, (0.0, 1.0))];
+        let mut squares = |p: &[f64]| Some(vec![p[0] * p[0], 3.0 * p[0]]);
+        // (1 - .75^2) / .25 and 3.
+        assert_eq!(derivatives(&one, &[1.0], &[1.0, 3.0], &mut squares), Some(vec![vec![1.75, 3.0]]));
+        // Forwards within it: (.75^2 - .5^2) / .25.
+        assert_eq!(derivatives(&one, &[0.5], &[0.25, 1.5], &mut squares), Some(vec![vec![1.25, 3.0]]));
+    }
+
+    #[test]
+    fn linear_equations_are_solved_with_pivots() {
+        let matrix = vec![vec![2.0, 1.0, 0.0], vec![1.0, 3.0, 1.0], vec![0.0, 1.0, 2.0]];
+        let found = solve(matrix, vec![4.0, 10.0, 8.0]).unwrap();
+        assert!(found.iter().zip([1.0, 2.0, 3.0]).all(|(x, e)| (x - e).abs() < 1e-12), "{found:?}");
+        assert_eq!(solve(vec![vec![0.0, 2.0], vec![4.0, 0.0]], vec![6.0, 8.0]), Some(vec![2.0, 3.0]));
+        assert_eq!(solve(vec![vec![1.0, 2.0], vec![2.0, 4.0]], vec![1.0, 2.0]), None);
+        assert_eq!(standard_errors(&[vec![3.0, 4.0], vec![0.0, 2.0]]).map(|e| e.len()), Some(2));
+        assert_eq!(sum_of_squares(&[3.0, -4.0]), 25.0);
+    }
+}

@@ -260,4 +260,6 @@ fn collect_sheets(cases: &[Examined<'_>], chosen: &[usize], subject: &Subject) -
 #[cfg(test)]
 mod lookup_tests;
 #[cfg(test)]
+mod table_tests;
+#[cfg(test)]
 mod tests;

@@ -17,6 +17,9 @@ const MAX_REFLECTIONS: u32 = 60;
 /// Part of the brightest patch's light below which light is followed no further.
 const NEGLIGIBLE_SHARE: f64 = 1e-4;
 
+/// A meter so near to the plane of a surface lies in it.
+const SAME_PLANE_M: f64 = 1e-9;
+
 struct Patch {
     surface: Surface,
     corners_m: [DVec3; 4],
@@ -98,7 +101,17 @@ fn factors_of_patch(patch: &Patch, patches: &[Patch]) -> Vec<f64> {
 }
 
 fn factors_of_meter(meter: &Meter, patches: &[Patch]) -> Vec<f64> {
-    patches.iter().map(|p| element_to_polygon(meter.position_m, meter.normal, &p.corners_m)).collect()
+    patches.iter().map(|patch| factor_of_meter(meter, patch)).collect()
+}
+
+/// The configuration factor of a patch; none where the meter lies in its plane, which the polygon formula takes for all that it sees.
+fn factor_of_meter(meter: &Meter, patch: &Patch) -> f64 {
+    let distance_m = (meter.position_m - patch.corners_m[0]).dot(patch.surface.inward_normal());
+    if distance_m.abs() < SAME_PLANE_M {
+        0.0
+    } else {
+        element_to_polygon(meter.position_m, meter.normal, &patch.corners_m)
+    }
 }
 
 impl Patch {
@@ -132,4 +145,74 @@ fn split_into_patches(room: &Room, surface: Surface) -> Vec<Patch> {
         patches.push(Patch { surface, corners_m });
     }
     patches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use luxproof_engines::fixtures;
+    use luxproof_photometry::LuminousIntensityDistribution;
+    use luxproof_scene::geometry::Reflectances;
+
+    /// A cube of 2 m with an isotropic luminaire of 100 cd in its middle.
+    fn cube(reflectance: f64) -> (Room, Luminaire) {
+        let even = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap();
+        let reflectance = Reflectances::with_equal_walls(reflectance, reflectance, reflectance);
+        let room = Room { size_m: DVec3::splat(2.0), reflectance };
+        (room, fixtures::luminaire("lamp", DVec3::splat(1.0), even))
+    }
+
+    #[test]
+    fn a_closed_room_has_the_reflected_light_of_its_flux() {
+        // Phi = 400 pi on 24 m2: Phi rho / (A (1 - rho)) in the mean, and Phi rho / A of the first reflection alone.
+        let meters = Surface::ALL.map(|surface| {
+            let [a, b, c, d] = cube(0.5).0.corners(surface);
+            Meter { position_m: 0.25 * (a + b + c + d), normal: surface.inward_normal() }
+        });
+        let first = 400.0 * std::f64::consts::PI / 24.0;
+        for (reflectance, bounces, expected) in [
+            (0.5, Bounces::Converged, first),
+            (0.8, Bounces::Converged, 4.0 * first),
+            (0.5, Bounces::AtMost(1), 0.5 * first),
+            (0.5, Bounces::AtMost(2), 0.75 * first),
+            (0.5, Bounces::AtMost(0), 0.0),
+        ] {
+            let (room, lamp) = cube(reflectance);
+            let solver = PatchRadiosity::new(&room, &meters);
+            let found = solver.illuminance(&room, std::slice::from_ref(&lamp), &meters, bounces);
+            // In the middle of each side it is more than in the mean, by a tenth for one reflection.
+            assert!(found.iter().all(|e| (e - expected).abs() <= 0.12 * expected), "{bounces:?}: {found:?} {expected}");
+            assert!(found.iter().all(|e| (e - found[0]).abs() < 1e-9), "{found:?}");
+            // The same for meters that were not asked for at first, and twice as much of two.
+            let other = PatchRadiosity::new(&room, &meters[..1]).illuminance(
+                &room,
+                std::slice::from_ref(&lamp),
+                &meters,
+                bounces,
+            );
+            assert_eq!(found, other);
+            let twice = solver.illuminance(&room, &[lamp.clone(), lamp], &meters, bounces);
+            assert!(twice.iter().zip(&found).all(|(a, b)| (a - 2.0 * b).abs() < 1e-9 * a.max(1.0)));
+        }
+    }
+
+    #[test]
+    fn patches_cover_a_surface_and_see_the_whole_room() {
+        let room = Room { size_m: DVec3::new(3.0, 5.0, 2.0), ..cube(0.5).0 };
+        let patches = split_into_patches(&room, Surface::Floor);
+        assert_eq!(patches.len(), 25);
+        let areas = patches.iter().map(|p| {
+            let [a, b, _, d] = p.corners_m;
+            (b - a).cross(d - a).length()
+        });
+        assert!(areas.clone().all(|area| (area - 15.0 / 25.0).abs() < 1e-12));
+        let middle = patches.iter().map(|p| p.at(0.5, 0.5)).sum::<DVec3>() / 25.0;
+        assert!((middle - DVec3::new(1.5, 2.5, 0.0)).length() < 1e-12, "{middle}");
+        let solver = PatchRadiosity::new(&room, &[]);
+        assert!(solver.patch_factors.iter().all(|row| (row.iter().sum::<f64>() - 1.0).abs() < 1e-12));
+        // No patch sees its own surface.
+        assert!(solver.patch_factors[0][..25].iter().all(|factor| *factor == 0.0));
+        // 150 patches with four points each; thirty units for the reflections of a patch.
+        assert_eq!(PatchRadiosity::count_work(3, 7), 150 * (4 * 3 + 7 + 30));
+    }
 }

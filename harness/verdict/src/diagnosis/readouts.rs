@@ -102,3 +102,22 @@ fn is_common_step(values: &[f64], step: f64) -> bool {
     let is_multiple = |value: &f64| (value / step - (value / step).round()).abs() < MAX_STEP_ERROR;
     step > MIN_STEP_SHARE * values[0] && values.iter().all(is_multiple)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn a_step_is_found_that_all_readings_are_multiples_of() {
+        // The smallest difference is 1, of which 1.5 and 2.5 are no multiples.
+        let found = find_step(vec![4.0, 1.5, 2.5, 7.0]).unwrap();
+        assert!((found - 0.5).abs() < 1e-12, "{found}");
+        // Rounding of a hundredth of the step is none; darkness and repetitions do not count.
+        let found = find_step(vec![0.0, 3.003, 5.997, 9.002, 9.002, 12.0]).unwrap();
+        assert!((found - 3.0).abs() < 2e-3, "{found}");
+        assert_eq!(find_step(vec![0.0, 3.0, 3.0, 6.0, 9.0]), None);
+        assert_eq!(find_step(vec![1.0, 2f64.sqrt(), 3f64.sqrt(), 7f64.sqrt()]), None);
+        // A step far below the readings shows nothing: 1 is less than a two-hundredth of 300.
+        assert_eq!(find_step(vec![300.0, 301.0, 302.0, 305.0]), None);
+        assert!(find_step(vec![100.0, 101.0, 102.0, 105.0]).is_some());
+    }
+}

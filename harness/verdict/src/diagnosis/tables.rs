@@ -539,8 +539,12 @@ pub(super) fn continue_planes(luminaire: &mut Luminaire, end: EndOfPlanes) -> bo
         EndOfPlanes::Last => c_deg.extend([360.0 - EDGE, 360.0]),
         EndOfPlanes::Repeated => {
             let turns = (360.0 / last).ceil() as u32;
-            let again = (1..turns).flat_map(|turn| own.c_deg().iter().map(move |c| c + f64::from(turn) * last));
-            c_deg.extend(again.map(|c| c + EDGE).filter(|c| *c < 360.0).collect::<Vec<_>>());
+            for turn in (1..turns).map(f64::from) {
+                c_deg.extend(own.c_deg().iter().map(|c| c + turn * last + EDGE));
+                // The last plane counts up to the first of the next turn.
+                c_deg.push((turn + 1.0) * last - EDGE);
+            }
+            c_deg.retain(|c| *c < 360.0);
             c_deg.push(360.0);
         }
     }
