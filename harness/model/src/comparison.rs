@@ -120,6 +120,8 @@ mod tests {
         let c = comparison();
         assert_eq!((c.basis(), c.basis_name(), c.allowed()), (Some(Basis::Simulator), "simulator", 1.0));
         assert_eq!(c.normalized_error(), Some(2.0));
+        let low = Comparison { deviation: Some(-0.5), ..comparison() };
+        assert_eq!(low.normalized_error(), Some(-0.5));
         let equal = Comparison { deviation: Some(0.0), tolerance: Tolerance::default(), ..comparison() };
         assert_eq!(equal.normalized_error(), Some(0.0));
         let none_allowed = Comparison { tolerance: Tolerance::default(), ..comparison() };

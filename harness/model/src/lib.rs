@@ -501,8 +501,8 @@ mod tests {
     fn a_recording_gives_its_readings_by_meter_also_where_some_are_missing() {
         let mut found = recording();
         for (k, value) in [(0, 1.0), (2, 3.0), (3, 4.0)] {
-            let (meter, quantity) = (MeterId::new("desk", k), Quantity::Illuminance);
-            found.readings.push(Reading { meter, quantity, value, uncertainty: Uncertainty::Exact });
+            let meter = MeterId::new("desk", k);
+            found.readings.push(Reading::new(meter, Quantity::Illuminance, Estimate::exact(value)));
         }
         let values: Vec<Option<f64>> =
             (0..5).map(|k| found.reading(k, &MeterId::new("desk", k)).map(|r| r.value)).collect();

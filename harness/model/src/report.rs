@@ -279,7 +279,7 @@ impl Report {
 mod tests {
     use super::*;
     use crate::fixtures::{comparison, engine, recording};
-    use crate::{Basis, ErrorFinding, Quantity, Scope, Status, Uncertainty};
+    use crate::{Basis, ErrorFinding, Estimate, Quantity, Scope, Status};
 
     fn case(name: &str) -> CaseRecord {
         CaseRecord {
@@ -459,8 +459,7 @@ mod tests {
         assert_eq!(found.procedures(), both);
         let key = comparison().key;
         for (k, value) in [(0, 1.0), (1, 2.0)] {
-            let (meter, quantity, uncertainty) = (MeterId::new("desk", k), Quantity::Illuminance, Uncertainty::Exact);
-            let reading = Reading { meter, quantity, value, uncertainty };
+            let reading = Reading::new(MeterId::new("desk", k), Quantity::Illuminance, Estimate::exact(value));
             found.readings.push(ReadingRecord { key: key.clone(), model: "point".to_owned(), reading });
         }
         let second = MeterId::new("desk", 1);
@@ -471,12 +470,7 @@ mod tests {
 
     #[test]
     fn more_than_ten_thousand_comparisons_or_readings_are_long() {
-        let reading = Reading {
-            meter: MeterId::new("desk", 0),
-            quantity: Quantity::Illuminance,
-            value: 1.0,
-            uncertainty: Uncertainty::Exact,
-        };
+        let reading = Reading::new(MeterId::new("desk", 0), Quantity::Illuminance, Estimate::exact(1.0));
         let record = ReadingRecord { key: comparison().key, model: String::new(), reading };
         for (count, is_long) in [(MAX_ON_ONE_PAGE, false), (MAX_ON_ONE_PAGE + 1, true)] {
             assert_eq!(Report { comparisons: vec![comparison(); count], ..report() }.is_long(), is_long);
