@@ -12,6 +12,8 @@ use luxproof_verdict::diagnosis::{Model, truth};
 
 /// Steps of the grids on which a wrong look-up is sampled for reflected light, in degrees.
 const FINE_STEP_DEG: f64 = 1.0;
+/// How near the grids come to an angle where a look-up may jump, in degrees.
+const BESIDE_DEG: f64 = 1e-6;
 
 /// The readings of an adapter with a fault.
 pub(super) type AdapterReader = Box<dyn Fn(&Model) -> Vec<f64>>;
@@ -137,9 +139,7 @@ fn by_look_up(look_up: LookUp) -> AdapterReader {
         relight(model, |scene| {
             for l in &mut scene.luminaires {
                 let table = l.photometry.distribution.full_circle();
-                let steps =
-                    |most: f64| (0..=(most / FINE_STEP_DEG) as u32).map(|k| FINE_STEP_DEG * f64::from(k)).collect_vec();
-                let (c_deg, gamma_deg) = (steps(360.0), steps(180.0));
+                let (c_deg, gamma_deg) = (fine_grid(table.c_deg(), 360.0), fine_grid(table.gamma_deg(), 180.0));
                 let candela =
                     c_deg.iter().cartesian_product(&gamma_deg).map(|(c, g)| look_up(&table, c % 360.0, *g)).collect();
                 if let Ok(fine) = LuminousIntensityDistribution::new(c_deg, gamma_deg, candela) {
@@ -148,6 +148,18 @@ fn by_look_up(look_up: LookUp) -> AdapterReader {
             }
         })
     })
+}
+
+/// A grid from 0 on, with both sides of a table's angles and of their mid-points, where look-ups jump.
+fn fine_grid(of_table: &[f64], most_deg: f64) -> Vec<f64> {
+    let mut grid = (0..=(most_deg / FINE_STEP_DEG) as u32).map(|k| FINE_STEP_DEG * f64::from(k)).collect_vec();
+    let middles = of_table.windows(2).map(|pair| f64::midpoint(pair[0], pair[1]));
+    for angle in of_table.iter().copied().chain(middles) {
+        grid.extend([angle - BESIDE_DEG, angle + BESIDE_DEG].iter().filter(|a| (0.0..=most_deg).contains(*a)));
+    }
+    grid.sort_by(f64::total_cmp);
+    grid.dedup();
+    grid
 }
 
 /// C and gamma of a point in the frame of a luminaire, in degrees.

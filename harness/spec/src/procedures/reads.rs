@@ -355,7 +355,7 @@ mod tests {
                     for b in &parts.aspects[i + 1..] {
                         let (sine, cosine) =
                             (a.meter.normal.cross(b.meter.normal).length(), a.meter.normal.dot(b.meter.normal));
-                        assert!(cosine < 0.0 || sine < 1e-9 || sine > 0.05, "{reads:?} {normal}: {sine}");
+                        assert!(cosine < 0.0 || !(1e-9..=0.05).contains(&sine), "{reads:?} {normal}: {sine}");
                     }
                 }
             }
