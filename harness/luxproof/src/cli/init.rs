@@ -61,12 +61,12 @@ pub(super) struct InitArgs {
     /// Reflectances of floor, walls and ceiling, from 0 to 1
     #[arg(long, value_name = "F,W,C")]
     reflectance: Option<Reflectances>,
-    /// Photometric file; it is copied next to the spec [default: a made-up downlight]
+    /// Photometric file, copied next to the spec [default: a downlight]
     ///
     /// The mounting height, the model and the meters follow from the file and the room.
     #[arg(long, value_name = "FILE")]
     photometry: Option<PathBuf>,
-    /// `recessed` in the ceiling, or metres from the ceiling down to the photometric centre [default: by the file]
+    /// `recessed`, or metres below the ceiling [default: by the file]
     #[arg(long, value_name = "recessed|METRES")]
     mounting: Option<Mounting>,
     /// Ask no questions; use defaults
