@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 def reproduce(what: str | os.PathLike[str], *, out: str | os.PathLike[str], options: Sequence[str] = ()) -> pandas.DataFrame:
     """Makes a paper's tables again, or the run of a bundle, as `luxproof reproduce` does; the new run's files lie in `out`.
 
-    Of a paper's tables (YAML) a row a printed cell: table, column, place, printed; rounding, computed and uncertainty (half width of
+    A paper's tables (YAML) have one row for each printed cell: table, column, place, printed; rounding, computed and uncertainty (half width of
     its interval) in `unit`; standing: reproduced, not_reproduced, undecided, not_read; fits_table: whether the cell
-    agrees with the other columns of its own table. Of a bundle a row a case, procedure and engine:
+    agrees with the other columns of its own table. A bundle has one row for each case, procedure and engine:
     outcome, comparisons, differences, notes. Raises LuxproofError where it is no bundle or no table, or the bundle was changed.
     """
     answer = ask(["reproduce", os.fspath(what), "--out", os.fspath(out), "--format", "json", *options])

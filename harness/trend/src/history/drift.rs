@@ -218,25 +218,8 @@ fn residual_of_steps(points: &[Point], steps: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::series::Key;
-    use luxproof_model::{MeterId, ProcedureId, ReadingKey};
+    use crate::history::synthetic::{is_near, series};
     use luxproof_process::random::normal;
-
-    fn is_near(found: f64, expected: f64) -> bool {
-        (found - expected).abs() < 1e-9 * expected.abs().max(1.0)
-    }
-
-    fn series(reference: f64, std_error: &[f64], deviation: &[f64]) -> Series {
-        let key = Key {
-            reading: ReadingKey::new("room", ProcedureId::IndirectIlluminance, "mine"),
-            model: String::new(),
-            meter: MeterId::new("desk", 0),
-            basis: None,
-            source: String::new(),
-        };
-        let (reference, verdicts) = (vec![reference; deviation.len()], vec![None; deviation.len()]);
-        Series { key, deviation: deviation.to_vec(), std_error: std_error.to_vec(), reference, verdicts }
-    }
 
     #[test]
     fn a_trend_adds_deviations_in_standard_errors_and_gives_steps_their_relative_size() {

@@ -333,8 +333,7 @@ fn normal_deviate(t: f64, degrees_of_freedom: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::series::Key;
-    use luxproof_model::{MeterId, ProcedureId, ReadingKey};
+    use crate::history::synthetic::{is_near, series};
 
     #[test]
     fn the_deviate_is_as_likely_as_students_t() {
@@ -351,23 +350,6 @@ mod tests {
         assert_eq!((moderated.squares, moderated.count), (90.0, 60));
         let unchanged = Spread::known(40.0, 10).moderated_by(Spread::known(40.0, 10));
         assert_eq!((unchanged.squares, unchanged.count), (40.0, 10));
-    }
-
-    fn is_near(found: f64, expected: f64) -> bool {
-        (found - expected).abs() < 1e-9 * expected.abs().max(1.0)
-    }
-
-    /// A series about a reference of 100.
-    fn series(std_error: &[f64], deviation: &[f64]) -> Series {
-        let key = Key {
-            reading: ReadingKey::new("room", ProcedureId::IndirectIlluminance, "mine"),
-            model: String::new(),
-            meter: MeterId::new("desk", 0),
-            basis: None,
-            source: String::new(),
-        };
-        let (reference, verdicts) = (vec![100.0; deviation.len()], vec![None; deviation.len()]);
-        Series { key, deviation: deviation.to_vec(), std_error: std_error.to_vec(), reference, verdicts }
     }
 
     #[test]
@@ -505,7 +487,7 @@ mod tests {
 
     #[test]
     fn a_mean_predicts_the_next_night_with_the_error_of_both() {
-        let read = series(&[1.0, 3.0, 0.0, 9.0], &[1.0, 5.0, f64::NAN, 3.0]);
+        let read = series(100.0, &[1.0, 3.0, 0.0, 9.0], &[1.0, 5.0, f64::NAN, 3.0]);
         let mut mean = RunningMean::default();
         assert!(mean.innovation(&read, 0).is_none() && mean.update(&read, 0).is_none());
         assert_eq!((mean.nights, mean.mean, mean.square_of_errors), (1.0, 1.0, 1.0));
@@ -531,12 +513,12 @@ mod tests {
         // After 24 nights of 1, an error of 3 is more than twice sqrt((24 + 9) / 25) = 1.149, one of 2 less than 2 * 1.058.
         let mut errors = vec![1.0; 24];
         errors.extend([3.0, 2.0]);
-        let read = series(&errors, &[0.0; 26]);
+        let read = series(100.0, &errors, &[0.0; 26]);
         let mut mean = RunningMean::default();
         learn(&mut mean, &read, 24);
         assert_eq!(mean.error(&read, 24), 3.0);
         assert!(is_near(mean.error(&read, 25), (28.0_f64 / 25.0).sqrt()));
-        let exact = series(&[0.0; 3], &[50.0, -300.0, -100.0]);
+        let exact = series(100.0, &[0.0; 3], &[50.0, -300.0, -100.0]);
         let least = [0, 1, 2].map(|night| least_error(&exact, night));
         assert!(is_near(least[0] / 1e-6, 150.0) && is_near(least[1] / 1e-6, 200.0), "{least:?}");
         assert!(is_near(least[2] / 1e-6, 100.0) && RunningMean::default().error(&exact, 1) == least[1]);
@@ -546,7 +528,7 @@ mod tests {
     fn a_mean_follows_an_outlier_by_four_spreads_at_most() {
         // Innovations of (1 - mean) sqrt(n / (n + 1)): the spread of the first seven nights is known.
         let deviations = [0.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1000.0];
-        let read = series(&[1.0; 8], &deviations);
+        let read = series(100.0, &[1.0; 8], &deviations);
         let mut mean = RunningMean::default();
         learn(&mut mean, &read, 7);
         assert!(is_near(mean.mean, 0.0) && mean.spread.count == 6);
@@ -557,7 +539,7 @@ mod tests {
 
     #[test]
     fn comparisons_of_a_case_pool_their_innovations() {
-        let [one, other] = [[0.0, 2.0, 1.0], [0.0, -2.0, 0.0]].map(|deviation| series(&[1.0; 3], &deviation));
+        let [one, other] = [[0.0, 2.0, 1.0], [0.0, -2.0, 0.0]].map(|deviation| series(100.0, &[1.0; 3], &deviation));
         let before = noise_of_comparisons(&[&one, &other], 3);
         // The second night has innovations of 2 / sqrt(2) and -2 / sqrt(2).
         assert_eq!([0, 1, 2].map(|night| before[night].spread.count), [0, 0, 2]);
@@ -572,7 +554,7 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(1);
         let nights = 400;
         let common: Vec<f64> = (0..nights).map(|_| luxproof_process::random::normal(&mut random)).collect();
-        let all: Vec<Series> = (0..4).map(|_| series(&vec![1.0; nights], &common)).collect();
+        let all: Vec<Series> = (0..4).map(|_| series(100.0, &vec![1.0; nights], &common)).collect();
         let shared = expected_noise(&all.iter().collect::<Vec<_>>(), nights);
         // No scatter about the mean of members: the whole variance of 1 is shared, and four add up to 4 * 1.
         let last = shared[nights - 1].spread;
@@ -580,7 +562,7 @@ mod tests {
         let mut own = vec![];
         for _ in 0..4 {
             let deviation: Vec<f64> = (0..nights).map(|_| luxproof_process::random::normal(&mut random)).collect();
-            own.push(series(&vec![1.0; nights], &deviation));
+            own.push(series(100.0, &vec![1.0; nights], &deviation));
         }
         let independent = expected_noise(&own.iter().collect::<Vec<_>>(), nights);
         let last = independent[nights - 1].spread;
@@ -594,7 +576,7 @@ mod tests {
     fn members_that_repeat_exactly_are_expected_to_go_on() {
         let mut deviation = vec![3.0; 8];
         deviation[5] = 4.0;
-        let exact = series(&[0.0; 8], &deviation);
+        let exact = series(100.0, &[0.0; 8], &deviation);
         let counts: Vec<usize> = expected_noise(&[&exact], 8).iter().map(|noise| noise.spread.count).collect();
         // Two nights show a repetition, and the sixth ends it.
         assert_eq!(counts, [0, 0, 10, 10, 10, 10, 0, 0]);

@@ -15,6 +15,24 @@ const PROCEDURES: [ProcedureId; 4] = [
     ProcedureId::TotalIlluminance,
 ];
 
+/// Whether two numbers are the same but for rounding.
+pub(super) fn is_near(found: f64, expected: f64) -> bool {
+    (found - expected).abs() < 1e-9 * expected.abs().max(1.0)
+}
+
+/// The series of a meter with a constant reference.
+pub(super) fn series(reference: f64, std_error: &[f64], deviation: &[f64]) -> Series {
+    let key = Key {
+        reading: ReadingKey::new("room", ProcedureId::IndirectIlluminance, "mine"),
+        model: String::new(),
+        meter: MeterId::new("desk", 0),
+        basis: None,
+        source: String::new(),
+    };
+    let (reference, verdicts) = (vec![reference; deviation.len()], vec![None; deviation.len()]);
+    Series { key, deviation: deviation.to_vec(), std_error: std_error.to_vec(), reference, verdicts }
+}
+
 /// The parameters of a synthetic history; the default is a year of 2000 comparisons a night.
 #[derive(Clone, Debug)]
 pub(super) struct Synthetic {
