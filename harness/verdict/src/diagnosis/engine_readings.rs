@@ -245,3 +245,6 @@ fn chi_squared_limit(freedom: usize) -> f64 {
     let freedom = freedom as f64;
     freedom + 3.1 * (2.0 * freedom).sqrt() + 6.0
 }
+
+#[cfg(test)]
+mod tests;

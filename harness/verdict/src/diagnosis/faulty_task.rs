@@ -708,3 +708,6 @@ impl Order {
 fn set_name(target: &Target) -> &str {
     target.id.0.rsplit_once('[').map_or("", |(set, _)| set)
 }
+
+#[cfg(test)]
+mod tests;
