@@ -148,7 +148,7 @@ impl Sample {
 
     /// Whether the tail with the sign of a number has shown itself heavier than a normal one; an empty sample counts as heavy.
     ///
-    /// So a group whose readings state no errors is limited by its own nights: without that limit skewed noise gives twice as many
+    /// So a group without stated errors is limited by its own nights: without that limit skewed noise gives twice as many
     /// false alarms.
     fn is_heavy(&self, sign: f64) -> bool {
         let of_normal = Normal::standard().inverse_cdf(1.0 - 0.5 / (self.sorted.len() as f64 + 1.0));

@@ -260,6 +260,8 @@ fn collect_sheets(cases: &[Examined<'_>], chosen: &[usize], subject: &Subject) -
 #[cfg(test)]
 mod fault_tests;
 #[cfg(test)]
+mod implementation_tests;
+#[cfg(test)]
 mod lookup_tests;
 #[cfg(test)]
 mod table_tests;
