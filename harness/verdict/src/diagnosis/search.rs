@@ -759,3 +759,6 @@ fn select_rivals(sorted: Vec<&ScoredCause>) -> Vec<Cause> {
     }
     if rivals.len() > MAX_RIVALS { vec![] } else { rivals.into_iter().map(|scored| scored.cause.clone()).collect() }
 }
+
+#[cfg(test)]
+mod tests;

@@ -118,3 +118,6 @@ fn largest_percent(quotients: impl Iterator<Item = f64>) -> f64 {
 fn shape_cause(id: &'static str, about: &str, what: &str, evidence: Evidence, score: f64) -> Cause {
     Cause { id, about: about.to_owned(), what: what.to_owned(), parameters: vec![], evidence, score }
 }
+
+#[cfg(test)]
+mod tests;
