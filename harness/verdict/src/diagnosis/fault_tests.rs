@@ -1,5 +1,7 @@
 //! Faults by hand: what each of them changes in small tasks, and which tasks it does not concern.
 
+#![allow(clippy::approx_constant, reason = "numbers by hand test the constants of the code")]
+
 use glam::DVec3;
 use luxproof_engines::fixtures;
 use luxproof_model::{MeterId, ProcedureId, Quantity};

@@ -1,5 +1,7 @@
 //! Faults of newly written renderers by hand: what each changes in small tasks.
 
+#![allow(clippy::approx_constant, reason = "numbers by hand test the constants of the code")]
+
 use std::f64::consts::PI;
 use std::sync::Arc;
 

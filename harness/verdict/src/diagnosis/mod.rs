@@ -262,6 +262,8 @@ mod fault_tests;
 #[cfg(test)]
 mod implementation_tests;
 #[cfg(test)]
+mod law_tests;
+#[cfg(test)]
 mod lookup_tests;
 #[cfg(test)]
 mod table_tests;
