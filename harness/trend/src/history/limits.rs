@@ -16,7 +16,7 @@ pub(super) struct Limits {
     /// The limit of either cumulative sum.
     pub(super) sum: f64,
     /// The limit of the moving sum over the square root of its number of nights, on either side.
-    window: f64,
+    pub(super) window: f64,
     /// The limit of one night on either side.
     pub(super) night: f64,
 }
@@ -129,6 +129,28 @@ mod tests {
     }
 
     #[test]
+    fn nights_between_alarms_are_those_of_the_published_formulas() {
+        // Siegmund: b = 2 (2 + 1.166) = 6.332, and (exp(6.332) - 7.332) / 4. With 1: b = 4.332.
+        assert!((nights_of_sums(2.0) / 138.737_007_5 - 1.0).abs() < 1e-9, "{}", nights_of_sums(2.0));
+        assert!((nights_of_sums(1.0) / 17.691_081_8 - 1.0).abs() < 1e-8, "{}", nights_of_sums(1.0));
+        // Siegmund and Venkatraman: y = 3 at 3 sqrt(5/2). nu = 2/3 (.9331928 - .5) / (1.5 * .9331928 + .1295176) = .1888406, and
+        // the rate 2 * 5.189148e-6 * 4.743416 / 5 * nu.
+        let found = nights_of_window(3.0 * 2.5_f64.sqrt());
+        assert!((found / 537_844.0 - 1.0).abs() < 1e-5, "{found}");
+        assert!((nights_of_window(2.0) / 49.069_887_16 - 1.0).abs() < 1e-6, "{}", nights_of_window(2.0));
+    }
+
+    #[test]
+    fn a_root_is_found_between_a_half_and_forty() {
+        for zero in [0.625, 3.0, 39.5] {
+            assert!((root(|x| x - zero) - zero).abs() < 1e-12, "{zero}");
+        }
+        // The moving sum has three quarters: one alarm in 400 nights of 300.
+        let limits = Limits::for_nights(300.0);
+        assert!((nights_of_window(limits.window) / 400.0 - 1.0).abs() < 1e-9, "{}", limits.window);
+    }
+
+    #[test]
     fn five_nights_exceed_their_limit_together_on_either_side() {
         let limits = Limits { sum: 1.0, window: 2.0, night: 3.0 };
         // 2 sqrt(5) = 4.4721.
@@ -143,5 +165,7 @@ mod tests {
         ] {
             assert_eq!(limits.are_exceeded_by(last.iter().copied()), is_exceeded, "{last:?}");
         }
+        // A sum at the limit does not exceed it.
+        assert!(!Limits { window: 0.0, ..limits }.are_exceeded_by([0.0; 5].into_iter()));
     }
 }

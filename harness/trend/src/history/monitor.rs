@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::change::{Course, Part};
 use super::drift::{Kink, Trend};
-use super::innovation::{Innovation, MAX_SPREADS, Noise, RunningMean};
+use super::innovation::{Innovation, Noise, RunningMean};
 use super::limits::{Limits, REFERENCE_VALUE, WINDOW_NIGHTS};
 use super::series::Series;
 
@@ -232,9 +232,8 @@ impl Sums {
             }
         }
         let last = &self.deviates[self.deviates.len().saturating_sub(WINDOW_NIGHTS)..];
-        let clamped = last.iter().map(|(_, deviate)| deviate.clamp(-MAX_SPREADS, MAX_SPREADS));
-        (is_firm && self.limits.are_exceeded_by(clamped))
-            .then(|| Signal { night: likeliest_night(last), noticed: night })
+        let is_exceeded = self.limits.are_exceeded_by(last.iter().map(|(_, deviate)| *deviate));
+        (is_firm && is_exceeded).then(|| Signal { night: likeliest_night(last), noticed: night })
     }
 
     fn are_zero(&self) -> bool {
@@ -302,3 +301,6 @@ fn likeliest_night(deviates: &[Deviate]) -> usize {
     }
     best.1
 }
+
+#[cfg(test)]
+mod tests;
