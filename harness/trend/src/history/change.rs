@@ -163,7 +163,7 @@ fn changes_at_level(history: &History, level: Level) -> Vec<Change> {
         let number = if level == Level::Comparison { k } else { 0 };
         groups.entry(((engine, procedure, case), number)).or_default().push(series);
     }
-    let limits = Limits::for_nights(groups.len() as f64 * DESIGN_NIGHTS / level.share());
+    let limits = Limits::for_nights(nights_per_alarm(level, groups.len()));
     let of_cases = if level == Level::Comparison { noise_by_case(history) } else { BTreeMap::new() };
     let mut found = vec![];
     for ((case_key @ (engine, procedure, case), _), members) in groups {
@@ -180,6 +180,11 @@ fn changes_at_level(history: &History, level: Level) -> Vec<Change> {
         }
     }
     found
+}
+
+/// The nights between false alarms of each of so many groups, so that the level as a whole has its share.
+fn nights_per_alarm(level: Level, groups: usize) -> f64 {
+    groups as f64 * DESIGN_NIGHTS / level.share()
 }
 
 /// An engine, a procedure and a case.
@@ -222,8 +227,195 @@ fn nights_of_ramp(ramp: &Range<usize>, night: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::synthetic::{Distribution, Drift, Shift, Synthetic};
+    use crate::history::synthetic::{Distribution, Drift, Shift, Synthetic, is_near, series};
     use luxproof_engines::fixtures::by_night;
+
+    fn step(standard_errors: f64) -> Course {
+        Course::Step { standard_errors, relative: 0.01 * standard_errors }
+    }
+
+    fn outlier(standard_errors: f64) -> Course {
+        Course::Outlier { standard_errors, relative: 0.01 * standard_errors }
+    }
+
+    fn drift(a_night: f64) -> Course {
+        Course::Drift { a_night, half_width: 1e-4, until: None }
+    }
+
+    /// A change of Mitsuba's indirect light.
+    fn change(level: Level, night: usize, noticed: usize, course: Course) -> Change {
+        let (procedure, part) = (ProcedureId::IndirectIlluminance, Part::default());
+        Change { level, engine: "mitsuba".into(), procedure, part, night, noticed, course, seen_in: vec![] }
+    }
+
+    #[test]
+    fn a_course_goes_upwards_where_its_size_is_positive() {
+        for (size, is_upwards) in [(0.5, true), (-0.5, false), (0.0, false)] {
+            let courses = [step(size), outlier(size), drift(size)];
+            assert_eq!(courses.map(Course::is_upwards), [is_upwards; 3], "{size}");
+        }
+    }
+
+    #[test]
+    fn the_shares_of_the_false_alarms_add_up_to_all() {
+        let shares: Vec<f64> = Level::VARIANTS.iter().map(|level| level.share()).collect();
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12 && shares.iter().all(|share| *share > 0.0));
+        // 14 * 75 / .7 and 2 * 75 / .05.
+        assert!((nights_per_alarm(Level::Comparison, 14) - 1500.0).abs() < 1e-9);
+        assert!((nights_per_alarm(Level::Case, 2) - 3000.0).abs() < 1e-9);
+    }
+
+    /// A change of a wide group, noticed one night later.
+    fn of_all(night: usize, course: Course) -> Change {
+        change(Level::EngineAndProcedure, night, night + 1, course)
+    }
+
+    /// A change of a case, noticed eight nights later.
+    fn of_case(night: usize, course: Course) -> Change {
+        change(Level::Case, night, night + 8, course)
+    }
+
+    /// Likewise of a single comparison.
+    fn of_comparison(night: usize, course: Course) -> Change {
+        change(Level::Comparison, night, night + 8, course)
+    }
+
+    #[test]
+    fn a_change_of_a_narrower_group_is_the_same_if_it_comes_with_that_of_the_wider_one() {
+        let (up, down) = (step(3.0), step(-3.0));
+        for (earlier, later, is_same) in [
+            // A step of a case may come three nights before or after, and that of a comparison 21 after.
+            (of_all(50, up), of_case(47, up), true),
+            (of_all(50, up), of_case(46, up), false),
+            (of_all(50, up), of_case(53, up), true),
+            (of_all(50, up), of_case(54, up), false),
+            (of_all(50, up), of_comparison(47, up), true),
+            (of_all(50, up), of_comparison(46, up), false),
+            (of_all(50, up), of_comparison(71, up), true),
+            (of_all(50, up), of_comparison(72, up), false),
+            (of_case(50, up), of_comparison(71, up), true),
+            // Two comparisons need equally long.
+            (of_comparison(50, up), of_comparison(53, up), true),
+            (of_comparison(50, up), of_comparison(54, up), false),
+            // The first nights have none before them.
+            (of_all(2, up), of_case(0, up), true),
+            (of_all(50, up), of_case(50, down), false),
+            (of_all(50, down), of_case(50, down), true),
+            // A drift is noticed eight nights after its first night. It may look like a step between.
+            (of_all(50, up), of_case(53, drift(0.1)), true),
+            (of_all(50, up), of_case(54, drift(0.1)), false),
+            (of_all(50, up), of_case(42, drift(0.1)), true),
+            (of_all(50, up), of_case(41, drift(0.1)), false),
+            (of_all(50, up), of_comparison(71, drift(0.1)), true),
+            (of_all(50, up), of_comparison(72, drift(0.1)), false),
+            (of_all(50, drift(0.1)), of_case(52, up), true),
+            (of_all(50, drift(0.1)), of_case(52, down), false),
+            // An outlier is that of the same night alone.
+            (of_all(50, outlier(3.0)), of_case(50, outlier(3.0)), true),
+            (of_all(50, outlier(3.0)), of_case(51, outlier(3.0)), false),
+            (of_all(50, outlier(3.0)), of_case(50, up), false),
+            (of_all(50, outlier(3.0)), of_case(50, outlier(-3.0)), false),
+            (of_all(50, up), of_case(51, outlier(3.0)), true),
+        ] {
+            assert_eq!(is_same_change(&earlier, &later), is_same, "{earlier:?} {later:?}");
+        }
+        let of_other_engine = Change { engine: "radiance".into(), ..of_case(50, up) };
+        let of_other_procedure = Change { procedure: ProcedureId::TotalIlluminance, ..of_case(50, up) };
+        for other in [of_other_engine, of_other_procedure] {
+            assert!(!is_same_change(&of_all(50, up), &other), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn a_change_includes_the_series_of_its_engine_procedure_case_and_meter() {
+        let key = series(100.0, &[1.0], &[0.0]).key;
+        let (case, meter) = (Some("room".to_owned()), Some(MeterId::new("desk", 0)));
+        let (other_case, other_meter) = (Some("hall".to_owned()), Some(MeterId::new("desk", 1)));
+        for (case, meter, is_included) in [
+            (None, None, true),
+            (case.clone(), None, true),
+            (case.clone(), meter.clone(), true),
+            (other_case.clone(), None, false),
+            (other_case, meter, false),
+            (case, other_meter, false),
+        ] {
+            let part = Part { case, meter };
+            let change = Change { engine: "mine".into(), part, ..change(Level::Comparison, 5, 6, step(1.0)) };
+            assert_eq!(change.includes(&key), is_included, "{change:?}");
+        }
+        let of_other_engine = of_all(5, step(1.0));
+        let procedure = ProcedureId::TotalIlluminance;
+        let of_other_procedure = Change { engine: "mine".into(), procedure, ..of_all(5, step(1.0)) };
+        assert!(!of_other_engine.includes(&key) && !of_other_procedure.includes(&key));
+    }
+
+    #[test]
+    fn a_ramp_grows_on_its_nights_alone() {
+        let passed: Vec<f64> = (0..8).map(|night| nights_of_ramp(&(3..6), night)).collect();
+        assert_eq!(passed, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 3.0]);
+    }
+
+    #[test]
+    fn a_drift_is_removed_by_the_line_over_its_nights_and_as_many_before() {
+        // Nights 4 to 6 drift by 0.5 each; nights 1 to 3 give the level of 2. Others do not count for the line.
+        let deviation = [9.0, 2.0, f64::NAN, 2.0, 2.5, 3.0, 3.5, 3.5, 8.0];
+        let mut drifting = series(100.0, &[1.0; 9], &deviation);
+        remove_ramp(&mut drifting, &(4..7));
+        let left = drifting.deviation;
+        assert!(left[2].is_nan(), "{left:?}");
+        for (night, expected) in [(0, 9.0), (1, 2.0), (3, 2.0), (4, 2.0), (5, 2.0), (6, 2.0), (7, 2.0), (8, 6.5)] {
+            assert!(is_near(left[night], expected), "{night}: {left:?}");
+        }
+        // Without readings there is no line.
+        let mut dark = series(100.0, &[1.0; 3], &[f64::NAN, f64::NAN, 7.0]);
+        remove_ramp(&mut dark, &(1..2));
+        assert_eq!(dark.deviation[2], 7.0);
+    }
+
+    /// A history of two cases with two meters each, of which some change by this on night 20.
+    fn with_changed_meters(is_changed: impl Fn(&Key) -> bool) -> History {
+        let mut made = vec![];
+        for (case, meter) in [("a", 0), ("a", 1), ("b", 0), ("b", 1)] {
+            let mut one = series(100.0, &[1.0; 40], &[0.0; 40]);
+            (one.key.reading.case, one.key.meter) = (case.to_owned(), MeterId::new("desk", meter));
+            let by = if is_changed(&one.key) { 20.0 } else { 0.0 };
+            for (night, deviation) in one.deviation.iter_mut().enumerate() {
+                *deviation = if night.is_multiple_of(2) { 1.0 } else { -1.0 } + if night < 20 { 0.0 } else { by };
+            }
+            made.push(one);
+        }
+        History { nights: vec![String::new(); 40], series: made, ..History::default() }
+    }
+
+    fn part(case: &str, meter: Option<usize>) -> Part {
+        Part { case: Some(case.to_owned()), meter: meter.map(|k| MeterId::new("desk", k)) }
+    }
+
+    #[test]
+    fn each_level_names_the_groups_that_changed() {
+        let history = with_changed_meters(|key| key.reading.case == "b");
+        for (level, parts) in [
+            (Level::EngineAndProcedure, vec![Part::default()]),
+            (Level::Case, vec![part("b", None)]),
+            (Level::Comparison, vec![part("b", Some(0)), part("b", Some(1))]),
+        ] {
+            let found = changes_at_level(&history, level);
+            assert_eq!(found.iter().map(|c| c.part.clone()).collect::<Vec<_>>(), parts, "{level:?}: {found:?}");
+            assert!(found.iter().all(|c| (c.level, c.night, c.noticed) == (level, 20, 21)), "{found:?}");
+        }
+        // All levels together show one change, and where it was seen.
+        let all = changes(&history);
+        let [Change { level: Level::EngineAndProcedure, seen_in, .. }] = &all[..] else { panic!("{all:?}") };
+        assert_eq!(*seen_in, [part("b", None), part("b", Some(0)), part("b", Some(1))]);
+    }
+
+    #[test]
+    fn comparisons_share_the_noise_of_their_case() {
+        let history = with_changed_meters(|_| false);
+        let noise = noise_by_case(&history);
+        let cases: Vec<(&str, usize)> = noise.iter().map(|((_, _, case), nights)| (*case, nights.len())).collect();
+        assert_eq!(cases, [("a", 40), ("b", 40)]);
+    }
 
     /// Seeds of the simulations; each is a year of 2000 comparisons a night.
     fn seeds() -> Range<u64> {

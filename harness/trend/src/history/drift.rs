@@ -348,6 +348,72 @@ mod tests {
     }
 
     #[test]
+    fn ten_nights_are_the_fewest_of_a_drift() {
+        let steep: Vec<f64> = (0..10).map(|n| 5.0 * (f64::from(n) - 4.0).max(0.0)).collect();
+        let found = trend(&steep, 5);
+        assert_eq!(found.drift(10, 1).map(|kink| kink.night), Some(4));
+        assert!(found.drift(9, 1).is_none());
+        // A night without a reading does not count.
+        let mut sparse = steep.clone();
+        sparse.insert(2, f64::NAN);
+        assert!(trend(&sparse, 6).drift(11, 1).is_some() && trend(&sparse, 6).drift(10, 1).is_none());
+    }
+
+    /// The residual of one level.
+    fn of_level(values: &[f64]) -> f64 {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| (value - mean).powi(2)).sum()
+    }
+
+    /// The least residual of two levels, or of three, by sums over all dates.
+    fn residual_of_levels(values: &[f64], steps: usize) -> f64 {
+        let mut least = f64::INFINITY;
+        for first in 1..values.len() {
+            for second in first + 1..=values.len() {
+                if steps == 2 && second < values.len() {
+                    let parts = [&values[..first], &values[first..second], &values[second..]];
+                    least = least.min(parts.map(of_level).iter().sum());
+                } else if steps == 1 {
+                    least = least.min(of_level(&values[..first]) + of_level(&values[first..]));
+                }
+            }
+        }
+        least
+    }
+
+    #[test]
+    fn the_evidence_of_a_drift_is_that_of_schwarz_and_must_exceed_ten() {
+        // Twelve nights on a level, and ten on a line.
+        const NOISE: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
+        let mut counts = [0, 0];
+        for (steps, k) in (0..40).map(|k| (1, k)).chain((0..40).map(|k| (2, k))) {
+            let slope = 0.25 + 0.02 * f64::from(k);
+            let values: Vec<f64> = (0..22).map(|n| NOISE[n % 4] + slope * (n as f64 - 11.0).max(0.0)).collect();
+            let points: Vec<Point> = values.iter().enumerate().map(|(n, value)| (n as f64, *value)).collect();
+            let residuals = (0..21).map(|night| residual_by_hand(&points, f64::from(night)).0);
+            let residual = residuals.fold(f64::INFINITY, f64::min);
+            // A second step has two parameters more: 2 ln 22 = 6.182.
+            let penalty = if steps == 2 { 6.182 } else { 0.0 };
+            let evidence = 22.0 * (residual_of_levels(&values, steps) / residual).ln() + penalty;
+            if (evidence - 10.0).abs() > 0.01 {
+                let is_drift = trend(&values, 12).drift(22, steps).is_some();
+                assert_eq!(is_drift, evidence > 10.0, "{steps} {slope} {evidence}");
+                counts[usize::from(is_drift)] += 1;
+            }
+        }
+        assert!(counts.iter().all(|count| *count >= 10), "{counts:?}");
+    }
+
+    #[test]
+    fn a_slope_within_its_interval_is_no_drift() {
+        // Two levels explain little, but so does a line through noise that is larger than its rise.
+        let values: Vec<f64> = (0..24).map(|n| [3.0, -3.0][n % 2] + 0.05 * n as f64).collect();
+        let flat = trend(&values, 12);
+        let line = flat.line(24).unwrap();
+        assert!(line.slope.abs() <= line.half_width && flat.drift(24, 1).is_none(), "{line:?}");
+    }
+
+    #[test]
     fn a_night_on_a_line_is_judged_by_the_error_of_its_prediction() {
         // Nights 3 to 9 on a line: the error of night 10 is the root of 1 + 1/7 + 4^2 / 28. A value .5 above is 3.819 spreads of .1.
         let mut values: Vec<f64> = (0..10).map(|n| 1.0 + 2.0 * (f64::from(n) - 3.0).max(0.0)).collect();
