@@ -75,6 +75,29 @@ mod tests {
     }
 
     #[test]
+    fn whole_lines_end_with_a_line_feed() {
+        for (text, whole, cut_short) in [
+            ("", "", None),
+            ("a", "", Some(1)),
+            ("ab\n", "ab\n", None),
+            ("ab\nc", "ab\n", Some(2)),
+            ("ab\ncd\n\nef", "ab\ncd\n\n", Some(4)),
+        ] {
+            assert_eq!(whole_lines(text.as_bytes()), (whole.as_bytes(), cut_short), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_history_that_cannot_be_read_is_not_replaced() {
+        // A folder is there, but is no file.
+        let folder = tempfile::tempdir().unwrap();
+        let key = ReadingKey::new("room", ProcedureId::DirectIlluminance, "radiance");
+        let line = Line::new("2026-01-01", &key, Quantity::Illuminance, Verdict::Pass);
+        assert!(matches!(add(folder.path(), &[line]), Err(HistoryError::File(_))));
+        assert!(folder.path().is_dir());
+    }
+
+    #[test]
     fn a_night_run_again_takes_the_place_of_its_lines_and_of_no_others() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("history.jsonl");

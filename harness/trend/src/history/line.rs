@@ -390,4 +390,102 @@ mod tests {
         let rounded = [(1.732_05, 4), (-1.23456789e-12, 3), (0.0, 3), (f64::NAN, 3)].map(|(v, n)| rounded(v, n));
         assert_eq!(rounded, [Some(1.732), Some(-1.23e-12), Some(0.0), None]);
     }
+
+    /// A comparison of an engine's reading with a reference of this source.
+    fn comparison(engine: &str, meter: &str, source: &str) -> serde_json::Value {
+        serde_json::json!({"case": "room", "procedure": "direct_illuminance", "engine": engine, "model": "point",
+            "meter": meter, "at_m": [0, 0, 0], "normal": [0, 0, 1], "gamma_deg": null, "c_deg": null,
+            "quantity": "illuminance_lx", "value": 104, "std_error": 3.00004,
+            "reference": {"value": 100.0000000001, "uncertainty": 4, "basis": "simulator", "source": source},
+            "deviation": 4.00000001, "relative_deviation": 0.04, "tolerance": {"relative": 0.01, "absolute": 0},
+            "verdict": "fail", "diagnosis": null})
+    }
+
+    /// The run of an engine in the room, of this version.
+    fn recording(engine: &str, version: &str) -> serde_json::Value {
+        serde_json::json!({"case": "room", "procedure": "direct_illuminance", "engine": engine, "version": version,
+            "model": "point", "light": "direct", "input_sha256": "", "seed": 1, "method": {}, "approximation": null,
+            "notes": [], "wall_s": 1, "failure": null})
+    }
+
+    #[test]
+    fn a_report_has_a_line_for_each_engine_and_reference_with_the_numbers_of_its_meters() {
+        let mut report = Report { started: "2026-01-31T23:00:00Z".to_owned(), ..Report::default() };
+        for (engine, meter, source) in [
+            ("radiance", "m[0]", "solver"),
+            ("mitsuba", "m[0]", "solver"),
+            ("radiance", "m[1]", "solver"),
+            ("radiance", "m[1]", "paper"),
+            ("recorded", "m[0]", "solver"),
+        ] {
+            report.comparisons.push(serde_json::from_value(comparison(engine, meter, source)).unwrap());
+        }
+        for (engine, version, role) in
+            [("mitsuba", "3.5", Role::Renderer), ("radiance", "6.0", Role::Renderer), ("recorded", "1", Role::Recorded)]
+        {
+            let recording: luxproof_model::Recording = serde_json::from_value(recording(engine, version)).unwrap();
+            report.recordings.push(luxproof_model::Recording { role, ..recording });
+        }
+        // A run with another model of luminaire has another version, and a run of another engine is none of these.
+        let other = report.recordings[1].clone();
+        let other = luxproof_model::Recording { model: "area".to_owned(), version: "5.9".to_owned(), ..other };
+        report.recordings.insert(0, other);
+        report.comparisons[4].model = "point".to_owned();
+        let found = lines(&report, None).unwrap();
+        let heads: Vec<_> = found.iter().map(|l| (&*l.night, &*l.engine, &*l.version, &*l.source, l.count())).collect();
+        let night = "2026-01-31";
+        let expected = [
+            (night, "radiance", "6.0", "solver", 2),
+            (night, "mitsuba", "3.5", "solver", 1),
+            (night, "radiance", "6.0", "paper", 1),
+        ];
+        assert_eq!(heads, expected);
+        let Line { case, model, basis, verdict, meters, .. } = &found[0];
+        assert_eq!((&**case, &**model, *basis, *verdict), ("room", "point", Some(Basis::Simulator), Verdict::Fail));
+        assert_eq!(*meters, [Meters::Run("m".into(), 0, 1)]);
+        // Nine digits of the reference, six of the deviation, four of errors; 3 and 4 have the hypotenuse 5.
+        let Numbers { reference, deviation, std_error, u } = found[0].numbers(1);
+        assert_eq!((reference, deviation, std_error, u), (100.0, 4.0, 3.0, 5.0));
+        assert_eq!(&*lines(&report, Some("2026-02-01")).unwrap()[0].night, "2026-02-01");
+    }
+
+    #[test]
+    fn a_comparison_without_a_reference_has_no_numbers_but_its_error() {
+        let mut bare: Comparison = serde_json::from_value(comparison("radiance", "m[0]", "")).unwrap();
+        (bare.reference, bare.deviation) = (None, None);
+        let Numbers { reference, deviation, std_error, u } = Numbers::from_comparison(&bare);
+        assert!(reference.is_nan() && deviation.is_nan() && u.is_nan() && std_error == 3.0);
+        let report = Report { started: "2026-01-31".to_owned(), comparisons: vec![bare], ..Report::default() };
+        let found = lines(&report, None).unwrap();
+        assert_eq!((found[0].basis, &*found[0].source, &*found[0].version), (None, "", ""));
+        // An exact reading has the uncertainty of the reference alone.
+        let mut exact: Comparison = serde_json::from_value(comparison("radiance", "m[0]", "solver")).unwrap();
+        exact.uncertainty = luxproof_model::Uncertainty::Exact;
+        let Numbers { std_error, u, .. } = Numbers::from_comparison(&exact);
+        assert!(std_error.is_nan() && u == 4.0);
+        assert!(matches!(lines(&Report::default(), None), Err(HistoryError::Night { .. })));
+    }
+
+    #[test]
+    fn lines_are_one_where_all_but_the_meters_is_the_same() {
+        let (key, other_key) = (key(), ReadingKey::new("hall", ProcedureId::DirectIlluminance, "radiance"));
+        let line = Line { version: "1".into(), ..Line::new("2026-01-31", &key, Quantity::Illuminance, Verdict::Pass) };
+        assert!(line.has_same_head(&line.clone()));
+        for other in [
+            Line { night: "2026-02-01".into(), ..line.clone() },
+            Line { version: "2".into(), ..line.clone() },
+            Line { basis: Some(Basis::Iesna), ..line.clone() },
+            Line { verdict: Verdict::Fail, ..line.clone() },
+            Line { quantity: Quantity::Luminance, ..line.clone() },
+            Line { version: "1".into(), ..Line::new("2026-01-31", &other_key, line.quantity, line.verdict) },
+        ] {
+            assert!(!line.has_same_head(&other), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn a_list_without_any_number_is_left_out() {
+        assert!(has_no_number(&[]) && has_no_number(&[f64::NAN, f64::NAN]));
+        assert!(!has_no_number(&[f64::NAN, 0.0]) && !has_no_number(&[1.0]));
+    }
 }

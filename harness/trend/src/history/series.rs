@@ -232,4 +232,77 @@ mod tests {
         let (engine, from, to) = ("mitsuba".into(), "1.0".to_owned(), "1.1".to_owned());
         assert_eq!(parse(&text).unwrap().version_changes, [VersionChange { engine, night: 4, from, to }]);
     }
+
+    /// A history of three nights with these engines, procedures and verdicts.
+    fn with_verdicts(all: &[(&str, ProcedureId, [Verdict; 3])]) -> History {
+        let mut history = History { nights: ["n0", "n1", "n2"].map(str::to_owned).to_vec(), ..History::default() };
+        for (engine, procedure, verdicts) in all {
+            let mut series = crate::history::synthetic::series(100.0, &[1.0; 3], &[0.0; 3]);
+            series.key.reading = ReadingKey::new("room", *procedure, *engine);
+            series.verdicts = verdicts.map(Some).to_vec();
+            history.series.push(series);
+        }
+        history
+    }
+
+    #[test]
+    fn failures_are_counted_by_night_engine_and_procedure() {
+        use ProcedureId::{DirectIlluminance, TotalIlluminance};
+        use Verdict::{Fail, KnownDeviation, Missing, Pass, Undecided, UnexpectedPass};
+        let mut history = with_verdicts(&[
+            ("mine", DirectIlluminance, [Fail, Fail, Pass]),
+            ("mine", DirectIlluminance, [Fail, Missing, KnownDeviation]),
+            ("mine", DirectIlluminance, [Pass, UnexpectedPass, Undecided]),
+            ("mine", TotalIlluminance, [Pass, Pass, Fail]),
+            ("other", DirectIlluminance, [Pass, Fail, Fail]),
+        ]);
+        let expected = [
+            "n1 mine direct_illuminance: 3 failed verdicts",
+            "n1 other direct_illuminance: 1 failed verdict",
+            "n2 mine total_illuminance: 1 failed verdict",
+            "n2 other direct_illuminance: 1 failed verdict",
+        ];
+        let mut found = history.failures(1);
+        found.sort();
+        assert_eq!(found, expected);
+        assert_eq!(history.failures(0).len(), 5);
+        assert!(history.failures(3).is_empty());
+        history.series.iter_mut().for_each(|series| series.verdicts[2] = None);
+        assert!(history.failures(2).is_empty());
+    }
+
+    #[test]
+    fn series_are_found_by_engine_and_procedure() {
+        use ProcedureId::{DirectIlluminance, TotalIlluminance};
+        let passed = [Verdict::Pass; 3];
+        let history = with_verdicts(&[
+            ("other", DirectIlluminance, passed),
+            ("mine", TotalIlluminance, passed),
+            ("mine", DirectIlluminance, passed),
+            ("mine", DirectIlluminance, passed),
+        ]);
+        let (mine, other) = (EngineName::from("mine"), EngineName::from("other"));
+        for (engine, procedure, count) in [
+            (&mine, DirectIlluminance, 2),
+            (&mine, TotalIlluminance, 1),
+            (&other, DirectIlluminance, 1),
+            (&other, TotalIlluminance, 0),
+        ] {
+            let found = history.of_engine(engine, procedure);
+            assert_eq!(found.len(), count, "{engine} {procedure}");
+            assert!(found.iter().all(|s| s.key.reading.engine == *engine && s.key.reading.procedure == procedure));
+        }
+        let all: Vec<_> = history.engines_and_procedures().into_iter().collect();
+        assert_eq!(all.len(), 3);
+        assert!(all.contains(&(&mine, TotalIlluminance)) && all.contains(&(&other, DirectIlluminance)));
+    }
+
+    #[test]
+    fn versions_change_within_an_engine_alone() {
+        let versions: BTreeMap<(&str, usize), &str> =
+            [(("a", 0), "1"), (("a", 3), "1"), (("a", 5), "2"), (("b", 2), "3"), (("b", 6), "4")].into();
+        let found = version_changes(&versions);
+        let found: Vec<_> = found.iter().map(|c| (c.engine.to_string(), c.night, &*c.from, &*c.to)).collect();
+        assert_eq!(found, [("a".to_owned(), 5, "1", "2"), ("b".to_owned(), 6, "3", "4")]);
+    }
 }
