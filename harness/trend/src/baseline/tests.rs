@@ -10,6 +10,8 @@ use luxproof_model::{Estimate, MeterId, Method, ProcedureId, Quantity, Uncertain
 use luxproof_process::envelope::damaged;
 use luxproof_process::random::normal;
 
+mod reviews;
+
 fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
     let mut readings = vec![];
     for (k, value) in values.iter().enumerate() {
@@ -365,46 +367,6 @@ fn an_edited_torn_moved_or_older_file_is_no_baseline_and_the_error_says_what_to_
     assert!(error.contains("is about room, and this run about office"), "{error}");
 }
 
-fn reviewed(old: &[Entry], new: &[Entry], answers: &str) -> (Decision, String) {
-    let changes = compare(old, new, &References::default());
-    let (mut output, review) = (vec![], Review { changes: &changes, accepted: old, candidates: new });
-    let decision = review.ask("2026-11-21T00:00:00Z", &mut answers.as_bytes(), &mut output).unwrap();
-    (decision, String::from_utf8(output).unwrap())
-}
-
-#[test]
-fn a_review_shows_old_and_new_in_units_of_uncertainty_and_insists_on_a_reason() {
-    let (old, new) = (entry(&[100.0, 50.0], Some(1.0)), entry(&[120.0, 50.0], Some(1.0)));
-    let (decision, text) = reviewed(&[old], &[new], "perhaps\ny\n\nnew table\n");
-    assert!(text.contains("old 100.000000 new 120.000000 lx, change +20.000000: +14.1 u  <- changed"), "{text}");
-    assert!(text.contains("needs a reason"));
-    assert_eq!(decision.accepted.len(), 1);
-    assert_eq!((decision.accepted[0].reason.as_str(), decision.declined), ("new table", 0));
-}
-
-#[test]
-fn a_review_of_another_task_shows_old_and_new_as_does_accepting_everything() {
-    let (old, new) = (entry(&[100.0, 50.0], Some(1.0)), entry(&[120.0, 50.0], Some(1.0)));
-    let other = Entry { content_sha256: "cd".repeat(32), ..new };
-    let (old, new) = ([old], [other]);
-    let (_, text) = reviewed(&old, &new, "n\n");
-    assert!(text.contains("REFUSED") && text.contains("old 100.000000 new 120.000000 lx"), "{text}");
-    let changes = compare(&old, &new, &References::default());
-    let (mut output, review) = (vec![], Review { changes: &changes, accepted: &old, candidates: &new });
-    let decision = review.accept_all("new room", "2026-11-21T00:00:00Z", &mut output).unwrap();
-    assert_eq!((decision.accepted.len(), decision.accepted[0].reason.as_str()), (1, "new room"));
-    assert!(String::from_utf8(output).unwrap().contains("old 100.000000 new 120.000000 lx"));
-}
-
-#[test]
-fn what_is_unchanged_is_not_asked_about_and_an_ended_input_declines() {
-    let old = [entry(&[100.0, 50.0], Some(1.0))];
-    let (decision, text) = reviewed(&old, &old, "");
-    assert_eq!((decision.accepted.len(), decision.declined, text.as_str()), (0, 0, ""));
-    let (decision, _) = reviewed(&[], &old, "y\n");
-    assert_eq!((decision.accepted.len(), decision.declined), (0, 1), "no reason was given");
-}
-
 #[test]
 fn a_baseline_in_a_folder_is_named_after_its_spec() {
     let folder = tempfile::tempdir().unwrap();
@@ -416,4 +378,231 @@ fn a_baseline_in_a_folder_is_named_after_its_spec() {
     assert_eq!(Baseline::place(&named, &run), named.join("office.json"));
     assert_eq!(Baseline::place(folder.path(), &run), folder.path().join("office.json"));
     assert_eq!(Baseline::place(folder.path(), &SpecRecord::default()), folder.path().join("suite.json"));
+}
+
+/// Two runs of one meter for each of these, with old value, new value, standard error and reference.
+fn state_of(meters: &[[f64; 4]]) -> State {
+    let [mut old, mut new] = [0, 1].map(|side| entry(&meters.iter().map(|m| m[side]).collect::<Vec<_>>(), None));
+    for side in [&mut old, &mut new] {
+        for (reading, [.., error, _]) in side.readings.iter_mut().zip(meters) {
+            reading.uncertainty = Uncertainty::sampled(*error, None);
+        }
+    }
+    let mut references = References::default();
+    for (reading, [.., reference]) in old.readings.iter().zip(meters) {
+        references.0.insert((&old.key, &reading.meter, reading.quantity), vec![*reference]);
+    }
+    compare(std::slice::from_ref(&old), &[new], &references).entries[0].state
+}
+
+#[test]
+fn what_stays_equally_far_from_its_reference_is_not_improved() {
+    assert_eq!(state_with_references(&[102.0, 100.0], &[98.0, 100.0]), State::Changed);
+    assert_eq!(state_with_references(&[102.0, 100.0], &[98.5, 100.0]), State::Improved);
+    assert_eq!(state_with_references(&[102.0, 100.0], &[97.5, 100.0]), State::Changed);
+    // A meter that differs by rounding alone has not moved away.
+    assert_eq!(state_with_references(&[102.0, 100.0], &[101.0, 100.000_05]), State::Improved);
+}
+
+#[test]
+fn a_mean_that_moved_is_improved_if_it_came_nearer_in_relative_deviations() {
+    // No single change is beyond 1.5 standard errors; the mean of a hundred meters is.
+    for (new, state) in
+        [(100.0, State::Improved), (99.0, State::Shifted), (98.9, State::Shifted), (99.1, State::Improved)]
+    {
+        assert_eq!(state_of(&[[101.0, new, 1.0, 100.0]; 100]), state, "{new}");
+    }
+    // Forty meters of 50 lx come from 2 % to 0, and forty of 1000 lx go from 0 to -0.1 %.
+    let mut mixed = vec![[51.0, 50.0, 1.0, 50.0]; 40];
+    mixed.extend([[1000.0, 999.0, 1.0, 1000.0]; 40]);
+    assert_eq!(state_of(&mixed), State::Improved);
+    let reversed: Vec<[f64; 4]> = mixed.iter().map(|[old, new, rest @ ..]| [*new, *old, rest[0], rest[1]]).collect();
+    assert_eq!(state_of(&reversed), State::Shifted);
+    // A reference of zero has no relative deviation. Its meter came nearer, by too little to count.
+    mixed.push([0.3, 0.2, 1.0, 0.0]);
+    assert_eq!(state_of(&mixed), State::Improved);
+}
+
+#[test]
+fn nothing_is_improved_without_a_reference_or_away_from_one_of_several() {
+    let (old, new) = (entry(&[102.0, 100.0], None), entry(&[101.0, 100.0], None));
+    for (of_first, of_second, state) in [
+        (vec![100.0], vec![100.0], State::Improved),
+        (vec![], vec![100.0], State::Changed),
+        (vec![100.0], vec![], State::Changed),
+        (vec![100.0, 100.9], vec![100.0], State::Improved),
+        (vec![100.0, 101.9], vec![100.0], State::Changed),
+    ] {
+        let mut references = References::default();
+        for (reading, values) in old.readings.iter().zip([of_first, of_second]) {
+            references.0.insert((&old.key, &reading.meter, reading.quantity), values);
+        }
+        let found = compare(std::slice::from_ref(&old), std::slice::from_ref(&new), &references);
+        assert_eq!(found.entries[0].state, state, "{references:?}");
+    }
+}
+
+#[test]
+fn a_run_with_meters_that_nobody_accepted_is_not_called_improved() {
+    let (old, new) = (entry(&[102.0], None), entry(&[101.0, 100.0], None));
+    let mut references = References::default();
+    references.0.insert((&old.key, &old.readings[0].meter, Quantity::Illuminance), vec![100.0]);
+    let found = compare(std::slice::from_ref(&old), &[new], &references);
+    assert_eq!(found.entries[0].state, State::Changed);
+}
+
+#[test]
+fn references_are_those_of_all_comparisons_of_a_report() {
+    let mut report = Report::default();
+    for (meter, reference) in [("plane[0]", 100.0), ("plane[1]", 50.0), ("plane[0]", 101.0)] {
+        let comparison = json!({"case": "room", "procedure": "indirect_illuminance", "engine": "radiance", "model": "point",
+            "meter": meter, "at_m": [0, 0, 0], "normal": [0, 0, 1], "gamma_deg": null, "c_deg": null,
+            "quantity": "illuminance_lx", "value": 104, "deviation": null, "relative_deviation": null,
+            "reference": {"value": reference, "uncertainty": 1, "basis": "simulator", "source": ""},
+            "tolerance": {"relative": 0.01, "absolute": 0}, "verdict": "pass", "diagnosis": null});
+        report.comparisons.push(serde_json::from_value(comparison).unwrap());
+    }
+    report.comparisons.push(luxproof_model::Comparison { reference: None, ..report.comparisons[1].clone() });
+    let references = References::of_report(&report);
+    let key = ReadingKey::new("room", ProcedureId::IndirectIlluminance, "radiance");
+    for (k, values) in [(0, vec![100.0, 101.0]), (1, vec![50.0])] {
+        assert_eq!(references.0.get(&(&key, &MeterId::new("plane", k), Quantity::Illuminance)), Some(&values));
+    }
+}
+
+#[test]
+fn a_lone_meter_has_the_whole_level_and_no_mean() {
+    let found = compared(&[&entry(&[100.0], Some(1.0))], &[&entry(&[102.0], Some(1.0))]);
+    assert!((found.level - 0.01).abs() < 1e-12 && found.level_of_means == 0.0, "{found:?}");
+    assert!(found.entries[0].mean.is_none() && found.tests == 1);
+    // 2 over sqrt(2): 15.7299 % of a normal distribution lie beyond 1.41421 on either side.
+    assert!((found.entries[0].meters[0].p_value - 0.157299).abs() < 1e-6);
+}
+
+#[test]
+fn several_meters_that_fall_are_a_shift() {
+    let a = entry(&[100.0, 50.0, 20.0, 10.0], None);
+    assert_eq!(state(&a, &entry(&[100.0, 5.0, 18.0, 10.0], None)), State::Shifted);
+    assert_eq!(state(&a, &entry(&[100.0, 50.0, 18.0, 10.0], None)), State::Changed);
+}
+
+#[test]
+fn a_mean_ignores_what_has_no_relative_change_and_exact_values_among_sampled_ones() {
+    for (old, new, uncertainty) in [
+        (0.0, 3.0, Uncertainty::sampled(1.0, None)),
+        (300.0, f64::INFINITY, Uncertainty::sampled(1.0, None)),
+        (300.0, 330.0, Uncertainty::sampled(f64::INFINITY, None)),
+        (300.0, 330.0, Uncertainty::Exact),
+    ] {
+        let (mut before, mut now) = (entry(&[100.0, 200.0, old], Some(1.0)), entry(&[102.0, 202.0, new], Some(1.0)));
+        (before.readings[2].uncertainty, now.readings[2].uncertainty) = (uncertainty, uncertainty);
+        // 2 % and 1 % with weights of 1 to 4.
+        let shift = compared(&[&before], &[&now]).entries[0].mean.unwrap();
+        assert!((shift.relative - 0.012).abs() < 1e-12, "{old} {new}: {shift}");
+    }
+}
+
+#[test]
+fn an_unknown_error_is_no_change_and_an_infinite_one_is() {
+    for (uncertainty, p_value) in
+        [(Uncertainty::NotSeen, 1.0), (Uncertainty::sampled(f64::INFINITY, None), 0.0), (Uncertainty::Exact, 0.0)]
+    {
+        let (before, mut now) = (entry(&[100.0], None), entry(&[130.0], None));
+        now.readings[0].uncertainty = uncertainty;
+        assert_eq!(compared(&[&before], &[&now]).entries[0].meters[0].p_value, p_value, "{uncertainty:?}");
+        assert_eq!(compared(&[&now], &[&before]).entries[0].meters[0].p_value, p_value, "{uncertainty:?}");
+    }
+    // A millionth of the larger value is rounding.
+    for (new, p_value) in [(100.000_09, 1.0), (99.999_91, 1.0), (100.000_11, 0.0), (99.999_89, 0.0)] {
+        let found = compared(&[&entry(&[100.0], None)], &[&entry(&[new], None)]);
+        assert_eq!(found.entries[0].meters[0].p_value, p_value, "{new}");
+    }
+}
+
+#[test]
+fn another_task_is_named_by_the_beginning_of_its_checksum() {
+    let a = entry(&[100.0], None);
+    let found = compared(&[&a], &[&Entry { content_sha256: "cd".repeat(32), ..a.clone() }]);
+    assert_eq!(found.entries[0].notes, ["task: abababababab before, cdcdcdcdcdcd now"]);
+}
+
+#[test]
+fn the_first_of_two_readings_of_a_meter_counts() {
+    let a = entry(&[100.0], None);
+    let mut twice = a.clone();
+    twice.readings.push(entry(&[500.0], None).readings[0].clone());
+    assert_eq!(compared(&[&a], &[&twice]).entries[0].meters[0].new, 100.0);
+    assert_eq!(compared(&[&a], &[&a, &entry(&[500.0], None)]).entries[0].meters[0].new, 100.0);
+}
+
+#[test]
+fn a_sound_entry_has_finite_readings_that_are_not_negative() {
+    for (values, is_sound) in [
+        (&[1.0, 0.0][..], true),
+        (&[], false),
+        (&[1.0, -0.5], false),
+        (&[1.0, f64::INFINITY], false),
+        (&[f64::NAN], false),
+    ] {
+        assert_eq!(entry(values, None).is_sound(), is_sound, "{values:?}");
+    }
+}
+
+#[test]
+fn a_candidate_has_no_calibration_and_a_failed_or_recorded_engine_no_readings() {
+    let mut report = Report::default();
+    for (case, procedure, role, failure) in [
+        ("b", "indirect_illuminance", "renderer", None),
+        ("a", "indirect_illuminance", "reference", None),
+        ("c", "point", "renderer", None),
+        ("d", "indirect_illuminance", "renderer", Some("crashed")),
+        ("e", "indirect_illuminance", "recorded", None),
+    ] {
+        let key = json!({"case": case, "procedure": procedure, "engine": "mitsuba"});
+        let mut recording = json!({"version": "1", "role": role, "model": "point", "light": "direct", "input_sha256": "",
+            "content_sha256": "cd", "seed": 1, "method": {}, "approximation": null, "notes": [], "failure": failure,
+            "wall_s": 1});
+        let mut reading = json!({"model": "point", "meter": "plane[0]", "quantity": "illuminance_lx", "value": 100});
+        for part in [&mut recording, &mut reading] {
+            part.as_object_mut().unwrap().extend(key.as_object().unwrap().clone());
+        }
+        report.recordings.push(serde_json::from_value(recording).unwrap());
+        report.readings.push(serde_json::from_value(reading).unwrap());
+    }
+    for (baseline, cases) in [
+        (Baseline::candidate(&report), vec![("a", 1), ("b", 1), ("d", 0)]),
+        (Baseline::whole(&report), vec![("a", 1), ("b", 1), ("c", 1), ("d", 0)]),
+    ] {
+        let found: Vec<_> = baseline.entries.iter().map(|e| (e.key.case.as_str(), e.readings.len())).collect();
+        assert_eq!(found, cases);
+        assert!(baseline.entries.iter().all(|e| e.accepted.is_empty() && e.reason.is_empty()));
+    }
+}
+
+#[test]
+fn an_accepted_entry_replaces_that_of_its_key_in_order() {
+    let [a, b, c] = ["a", "b", "c"].map(|case| {
+        let mut entry = entry(&[1.0], None);
+        entry.key.case = case.to_owned();
+        entry
+    });
+    let mut baseline = Baseline { entries: vec![a.clone(), c.clone()] };
+    let newer = Entry { reason: "newer".into(), ..a };
+    baseline.accept(vec![b.clone(), newer.clone()]);
+    assert_eq!(baseline.entries, [newer, b, c]);
+}
+
+#[test]
+fn an_empty_baseline_is_that_of_any_run_and_specs_are_named_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.json");
+    Baseline::default().write(&path).unwrap();
+    assert!(Baseline::of_run(&path, ["office"]).unwrap().entries.is_empty());
+    let mut entries = vec![];
+    for case in ["room/light", "hall", "room/dark"] {
+        let mut one = entry(&[1.0], None);
+        one.key.case = case.to_owned();
+        entries.push(one);
+    }
+    assert_eq!(Baseline { entries }.subject(), "hall, room");
 }
