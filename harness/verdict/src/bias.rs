@@ -167,7 +167,7 @@ fn unweighted_mean(deviations: &[Deviation]) -> MeanDeviation {
 mod tests {
     use super::*;
     use crate::fixtures::{built_in, recording, task};
-    use luxproof_model::Estimate;
+    use luxproof_model::{ErrorFinding, Estimate, StatedErrors};
     use luxproof_process::random::normal;
 
     fn bias(readings: &[Estimate]) -> Bias {
@@ -295,5 +295,150 @@ mod tests {
         let found = bias(&[Estimate::exact(1.01), Estimate::exact(0.99), Estimate::exact(1.03)]);
         assert!((found.mean - 0.01).abs() < 1e-12 && (found.low + 0.01).abs() < 1e-12, "{found}");
         assert_eq!((found.p_value, found.to_string()), (None, "+1.000 % [-1.000, +3.000], range of 3".to_owned()));
+    }
+
+    fn deviation(relative: f64, uncertainty: f64, explained: f64) -> Deviation {
+        Deviation { relative, uncertainty, degrees_of_freedom: None, explained, is_judged: true }
+    }
+
+    fn are_close(a: f64, b: f64) -> bool {
+        (a - b).abs() <= 1e-6 * b.abs()
+    }
+
+    #[test]
+    fn readings_share_all_errors_but_chance_as_far_as_these_reach() {
+        let components = vec![
+            Component::normal(Source::MonteCarlo, 5.0, None),
+            Component::within(Source::Discretisation, 0.6),
+            Component::normal(Source::Reference, 0.2, Some(7.0)),
+            Component::within(Source::Input, 0.3),
+        ];
+        // A bound reaches to itself, an error of .2 to three times as far.
+        assert!(are_close(shared_error(&error_budget::budget(components, 0.02)), 0.6 + 0.6 + 0.3));
+    }
+
+    #[test]
+    fn a_mean_is_about_normal_without_skewed_blocks_and_heavy_tails() {
+        let is_normal =
+            |skewness| is_about_normal(&Recording { skewness, ..recording("radiance", &[Estimate::exact(1.0)]) });
+        assert_eq!([None, Some(2.33), Some(2.34)].map(is_normal), [true, true, false]);
+        let found = StatedErrors::from_finding(ErrorFinding::HeavyTail);
+        assert!(!is_about_normal(&Recording { stated_errors: vec![found], ..recording("radiance", &[]) }));
+    }
+
+    /// The probability within what is explained, where meters have this design effect by blocks and by repeated readings.
+    fn probability(deviations: &[Deviation], by_blocks: Option<f64>, by_seeds: Option<f64>) -> Option<f64> {
+        let of_seeds = |design_effect| {
+            let found = StatedErrors::from_finding(ErrorFinding::TooSmall);
+            StatedErrors { ratio: Some(1.0), design_effect, ..found }
+        };
+        // What states no ratio says nothing of what meters share.
+        let without_ratio = StatedErrors { design_effect: 50.0, ..StatedErrors::from_finding(ErrorFinding::Scatters) };
+        let stated_errors = by_seeds.map(of_seeds).into_iter().chain([without_ratio]).collect();
+        let recording = Recording { design_effect: by_blocks, stated_errors, ..recording("radiance", &[]) };
+        probability_within(deviations, &recording)
+    }
+
+    #[test]
+    fn a_bias_is_as_probable_as_its_excess_over_what_is_explained() {
+        // Two readings of .05, of which .02 and .03 are explained: the excess is .025, with an error of .01 / 2^(1/2) where they are
+        // independent, and of .01 where they share all noise. Normal probabilities beyond 3.5355 and 2.5 on both sides.
+        let [independent, shared] = [4.069_520_2e-4, 1.241_933_1e-2];
+        for side in [1.0, -1.0] {
+            let two = [deviation(side * 0.05, 0.01, 0.02), deviation(side * 0.05, 0.01, 0.03)];
+            for (by_blocks, by_seeds, expected) in [
+                (Some(1.0), None, independent),
+                (Some(2.0), None, shared),
+                (None, None, shared),
+                (None, Some(1.0), independent),
+                (Some(1.0), Some(2.0), shared),
+                (Some(2.0), Some(1.0), shared),
+            ] {
+                let found = probability(&two, by_blocks, by_seeds).unwrap();
+                assert!(are_close(found, expected), "{side} {by_blocks:?} {by_seeds:?}: {found}");
+            }
+        }
+        // Weights of 1 and 1/4: (.02 + .07 / 4) / 1.25 = .03 is explained. The excess of .02 is 5^(1/2) errors of .02 / 5^(1/2).
+        let two = [deviation(0.05, 0.01, 0.02), deviation(0.05, 0.02, 0.07)];
+        let found = probability(&two, Some(1.0), None).unwrap();
+        assert!(are_close(found, 2.534_731_9e-2), "{found}");
+        // A weighted mean of (.04 + .09 / 4) / 1.25 = .05, about which readings scatter by 5^(1/2) errors: 5^(1/2) * .02 / 5^(1/2). The
+        // excess of .02 is one error.
+        let two = [deviation(0.04, 0.01, 0.03), deviation(0.09, 0.02, 0.03)];
+        let found = probability(&two, Some(1.0), None).unwrap();
+        assert!(are_close(found, 0.317_310_508), "{found}");
+    }
+
+    #[test]
+    fn no_bias_fails_where_it_is_explained_or_where_its_probability_is_not_known() {
+        let two = |first: Deviation| probability(&[first, deviation(0.05, 0.01, 0.02)], Some(1.0), None);
+        assert!(two(deviation(0.05, 0.01, 0.02)).is_some());
+        // A mean of .05 with as much explained.
+        assert_eq!(two(deviation(0.05, 0.01, 0.08)), None);
+        assert_eq!(two(Deviation { is_judged: false, ..deviation(0.05, 0.01, 0.02) }), None);
+        for (uncertainty, is_known) in [(1e-6, false), (1.1e-6, true), (0.249, true), (0.25, false)] {
+            assert_eq!(two(deviation(0.05, uncertainty, 0.02)).is_some(), is_known, "{uncertainty}");
+        }
+        assert_eq!(probability(&[deviation(0.05, 0.01, 0.02)], Some(1.0), None), None);
+    }
+
+    #[test]
+    fn a_mean_has_the_interval_of_its_error_or_else_the_range_of_readings() {
+        let tail = upper_tail_of_normal(2.0);
+        let two = [deviation(0.04, 0.01, 0.0), deviation(0.04, 0.01, 0.0)];
+        let found = weighted_mean(&two, 1.0, tail).unwrap();
+        let half = 0.02 / 2f64.sqrt();
+        assert!(
+            are_close(found.low, 0.04 - half) && are_close(found.high, 0.04 + half) && are_close(found.value, 0.04)
+        );
+        assert!(found.scatter.is_some() && found.p_value.is_some_and(|p| p < 1e-6));
+        let shared = weighted_mean(&two, 2.0, tail).unwrap();
+        assert!(are_close(shared.high, 0.06), "{}", shared.high);
+        for (uncertainty, is_weighted) in [(1e-6, false), (1.1e-6, true)] {
+            let two = [deviation(0.05, uncertainty, 0.0), deviation(0.03, 0.01, 0.0)];
+            assert_eq!(weighted_mean(&two, 1.0, tail).is_some(), is_weighted, "{uncertainty}");
+        }
+        let key = ReadingKey::new("c", luxproof_model::ProcedureId::IndirectIlluminance, "radiance");
+        let infinite = [deviation(f64::INFINITY, 0.0, 0.0)];
+        assert_eq!(bias_of_group(&key, Basis::Simulator, &infinite, 1.0, tail), None);
+    }
+
+    /// Whether two meters of 200 lx fail by a common deviation: with errors of 2 lx, and a reference within a bound in lux.
+    fn do_two_fail(deviation: f64, bound: f64, lists_recording: bool) -> bool {
+        let uncertainty = Uncertainty::sampled(2.0, None);
+        let one = Estimate { value: 200.0 * (1.0 + deviation), uncertainty };
+        let exact = Estimate { value: 200.0, uncertainty: Uncertainty::Bound(bound) };
+        let subject = Recording { design_effect: Some(1.0), ..recording("radiance", &[one; 2]) };
+        let all = [recording("simulator", &[exact; 2]), subject];
+        let (judge, task) = (built_in(), task(2));
+        let comparisons = judge.compare(&task, &[&all[0], &all[1]]);
+        let listed = if lists_recording { &all[..] } else { &all[..1] };
+        let found = judge.bias(&comparisons, listed);
+        assert_eq!((found.len(), found[0].readings), (1, 2));
+        found[0].fails
+    }
+
+    #[test]
+    fn a_bias_fails_below_a_tenth_of_the_family_wise_error() {
+        // Beyond 3.8906 standard deviations lie 1e-4 on both sides. The error of the mean is .01 / 2^(1/2), and .02 is allowed.
+        let limit = 0.02 + 3.8906 * 0.01 / 2f64.sqrt();
+        assert!(do_two_fail(limit + 1e-4, 0.0, true) && do_two_fail(-limit - 1e-4, 0.0, true));
+        assert!(!do_two_fail(limit - 1e-4, 0.0, true) && !do_two_fail(-limit + 1e-4, 0.0, true));
+        assert!(!do_two_fail(limit + 1e-4, 0.0, false), "a recording that is not there");
+        // A bound of 3 lx is .015 more that meters share, and 3 of 7 parts of the variance.
+        let limit = 0.035 + 3.8906 * 7f64.sqrt() / 200.0 / 2f64.sqrt();
+        assert!(do_two_fail(limit + 1e-4, 3.0, true) && !do_two_fail(limit - 1e-4, 3.0, true));
+    }
+
+    #[test]
+    fn meters_that_no_sample_met_have_no_part_in_a_bias() {
+        let exact = recording("simulator", &[Estimate::exact(1.0); 3]);
+        let unseen = Estimate { value: 0.0, uncertainty: Uncertainty::NotSeen };
+        let read = Estimate { value: 1.01, uncertainty: Uncertainty::sampled(0.1, None) };
+        let subject = recording("radiance", &[read, unseen, read]);
+        let comparisons = built_in().compare(&task(3), &[&exact, &subject]);
+        let found = built_in().bias(&comparisons, &[]);
+        assert_eq!((found[0].readings, found.len()), (2, 1));
+        assert!(are_close(found[0].mean, 0.01), "{}", found[0]);
     }
 }

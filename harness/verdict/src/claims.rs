@@ -68,3 +68,87 @@ pub(super) fn round_up(within: f64) -> String {
     let step = 10f64.powf(percent.log10().floor() - 1.0);
     format!("{} %", trimmed((percent / step - 1e-9).ceil() * step, 6))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn claim(procedure: ProcedureId, within: Option<f64>, bias: Option<f64>) -> ProcedureClaim {
+        ProcedureClaim {
+            procedure,
+            readings: 9,
+            within,
+            failed: 0,
+            undecided: 0,
+            known_deviations: 0,
+            missing: 0,
+            bias,
+        }
+    }
+
+    const DIRECT: ProcedureId = ProcedureId::DirectIlluminance;
+
+    #[test]
+    fn a_bound_is_rounded_up_to_two_digits() {
+        for (within, shown) in [
+            (0.0101, "1.1 %"),
+            (0.01, "1 %"),
+            (0.0111, "1.2 %"),
+            (0.125, "13 %"),
+            (0.12, "12 %"),
+            (1.21, "130 %"),
+            (1.01e-4, "0.011 %"),
+            // The least that is shown is 1e-4 %.
+            (1e-9, "0.0001 %"),
+            (0.0, "0.0001 %"),
+            (1.21e-6, "0.00013 %"),
+        ] {
+            assert_eq!(round_up(within), shown, "{within}");
+        }
+    }
+
+    #[test]
+    fn a_range_has_the_nearer_deviation_first_and_names_its_side() {
+        for (from, to, shown) in [
+            (-0.05, -0.02, "2 to 5 % low"),
+            (0.02, 0.05, "2 to 5 % high"),
+            (-0.02, 0.05, "2 % low to 5 % high"),
+            (0.0, 0.0, "0 % low to 0 % high"),
+            (-0.05, 0.0, "0 to 5 % low"),
+            (0.0, 0.05, "0 to 5 % high"),
+            (-0.0301, -0.03, "3 % low"),
+            (0.03, 0.0301, "3 % high"),
+            (0.0314, 0.0314, "3.1 % high"),
+        ] {
+            assert_eq!(describe_range(from, to), shown, "{from} {to}");
+        }
+    }
+
+    #[test]
+    fn a_reach_is_in_percent_or_in_the_unit_of_a_rating() {
+        assert_eq!(describe_reach(&claim(DIRECT, None, None), 0.0101), "1.1 %");
+        assert_eq!(describe_reach(&claim(ProcedureId::UnifiedGlareRating, None, None), 1.21), "1.3 UGR");
+        assert_eq!(claim_name(&claim(ProcedureId::IndirectIlluminance, None, None)), "reflected");
+        assert_eq!(claim_name(&claim(DIRECT, None, None)), "direct");
+    }
+
+    #[test]
+    fn a_bias_is_reported_beyond_a_quarter_of_the_largest_deviation() {
+        for (within, bias, shown) in [
+            (Some(0.04), Some(0.0101), "direct within 4 % (1 % high on the whole)"),
+            (Some(0.04), Some(-0.0101), "direct within 4 % (1 % low on the whole)"),
+            (Some(0.04), Some(0.01), "direct within 4 %"),
+            (Some(0.04), None, "direct within 4 %"),
+            (None, Some(0.03), "direct only as is on record"),
+        ] {
+            assert_eq!(describe_sound(&claim(DIRECT, within, bias)), shown, "{within:?} {bias:?}");
+        }
+    }
+
+    #[test]
+    fn known_deviations_are_counted_where_something_passes() {
+        let known = |within| ProcedureClaim { known_deviations: 2, ..claim(DIRECT, within, None) };
+        assert_eq!(describe_sound(&known(Some(0.04))), "direct within 4 % but for 2 of 9 known to deviate");
+        assert_eq!(describe_sound(&known(None)), "direct only as is on record");
+    }
+}

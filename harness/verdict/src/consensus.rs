@@ -613,6 +613,9 @@ fn describe_assumptions(witnesses: &[WitnessReadings]) -> String {
 }
 
 #[cfg(test)]
+mod step_tests;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixtures::{built_in, recording, task};

@@ -312,4 +312,48 @@ mod tests {
         assert_eq!(verdict(&[LESS], -0.0559, 0.009), Verdict::KnownDeviation);
         assert_eq!(verdict(&[LESS], -0.0561, 0.009), Verdict::Undecided);
     }
+
+    /// The fields of one entry that are faulty.
+    fn faulty_fields(expected: &str, uncertainty: &str, texts: &str) -> Vec<String> {
+        let entry = format!(
+            "engine: radiance, procedure: indirect_illuminance, expected: {expected}, uncertainty: {uncertainty}, {texts}"
+        );
+        let text = format!("known_breaks: []\nknown_deviations:\n  - {{{entry}}}");
+        let source = Source::new("record.yaml".into(), text);
+        let record: OurRecord = source.parse().unwrap();
+        let faults = faults(&source, &record.known_deviations).into_iter();
+        // A message begins with its place.
+        faults.filter_map(|fault| Some(fault.message.split_once("].")?.1.split_once(": ")?.0.to_owned())).collect()
+    }
+
+    #[test]
+    fn an_entry_is_a_deviation_of_more_than_twice_its_uncertainty_with_cause_and_source() {
+        const TEXTS: &str = "cause: a cache, source: us";
+        for (expected, uncertainty, texts, fields) in [
+            ("-0.05", "0.0249", TEXTS, &[][..]),
+            ("-0.05", "0.025", TEXTS, &["uncertainty"]),
+            ("0.05", "0.026", TEXTS, &["uncertainty"]),
+            ("0.05", "0", TEXTS, &[]),
+            ("0.05", "-0.001", TEXTS, &["uncertainty"]),
+            ("-1", "0.1", TEXTS, &[]),
+            ("-1.01", "0.1", TEXTS, &["expected"]),
+            ("0", "0", TEXTS, &["expected"]),
+            (".inf", "0.1", TEXTS, &["expected"]),
+            ("0.05", "0.01", "cause: \" \", source: us", &["cause"]),
+            ("0.05", "0.01", "cause: a cache, source: \"\"", &["source"]),
+        ] {
+            assert_eq!(faulty_fields(expected, uncertainty, texts), fields, "{expected} {uncertainty} {texts}");
+        }
+    }
+
+    #[test]
+    fn a_reading_is_counted_for_the_entry_that_excuses_it() {
+        // Both are about the reading, and the first explains it.
+        let (comparison, on_record) = judged(&[LESS, "expected: -0.09, uncertainty: 0.002, owner: me"], -0.05, 0.0);
+        assert_eq!(comparison.verdict, Verdict::KnownDeviation);
+        let states: Vec<_> = on_record.iter().map(|outcome| (outcome.state, outcome.readings)).collect();
+        assert_eq!(states, [(State::Seen, 1), (State::NotSeen, 0)]);
+        // Nothing is known of a reading that is missing.
+        assert!(judged(&[LESS], f64::NAN, 0.0).1.is_empty());
+    }
 }

@@ -17,6 +17,8 @@ mod spending;
 mod split;
 mod statistics;
 #[cfg(test)]
+mod step_tests;
+#[cfg(test)]
 mod tests;
 mod tolerance;
 mod verdict;

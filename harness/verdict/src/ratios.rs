@@ -294,4 +294,6 @@ fn is_factor(quotient: f64, factor: f64) -> bool {
 }
 
 #[cfg(test)]
+mod step_tests;
+#[cfg(test)]
 mod tests;

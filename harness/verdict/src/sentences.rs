@@ -244,4 +244,6 @@ fn describe_place(report: &Report, failing: &[&Comparison], all: &[&Comparison])
 }
 
 #[cfg(test)]
+mod step_tests;
+#[cfg(test)]
 mod tests;

@@ -94,4 +94,33 @@ mod tests {
         assert!(split_deviations(&task(Transport::Direct), &all, 2.0).is_empty());
         assert!(split_deviations(&task(Transport::Indirect(Bounces::Converged)), &all[..2], 2.0).is_empty());
     }
+
+    #[test]
+    fn shares_have_the_intervals_of_renderer_and_exact_solution_at_their_coverage() {
+        let all =
+            [recording("iesna", 110.0, 9.0), recording("simulator", 100.0, 3.0), recording("radiance", 80.0, 4.0)];
+        let reading = |k: usize| with_interval(&all[k].readings[0], 2.0);
+        assert_eq!((reading(1).value.value(), reading(1).half_width.value()), (100.0, 6.0));
+        let found = split_deviations(&task(Transport::Indirect(Bounces::Converged)), &all.each_ref(), 2.0);
+        // Relative to the renderer: 30 of 80, of which 10 are the method's and 20 the renderer's.
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(close(found[0].whole, 0.375) && close(found[0].method_share, 0.125), "{found:?}");
+        assert!(close(found[0].renderer_share, 0.25), "{found:?}");
+        assert_eq!(find_reading(&all[0], &MeterId::new("grid", 1)), None);
+    }
+
+    #[test]
+    fn there_is_no_split_of_what_was_not_seen_is_dark_or_has_no_reading_elsewhere() {
+        let indirect = task(Transport::Indirect(Bounces::Converged));
+        let split = |method: f64, renderer: Estimate, meters: usize| {
+            let renderer = fixtures::recording("radiance", &vec![renderer; meters]);
+            let all = [recording("iesna", method, 0.0), recording("simulator", 1.0, 0.0), renderer];
+            split_deviations(&indirect, &all.each_ref(), 2.0).len()
+        };
+        assert_eq!(split(1.1, Estimate::exact(1.0), 1), 1);
+        assert_eq!(split(1.1, Estimate::exact(1.0), 2), 1);
+        assert_eq!(split(1.1, Estimate { value: 0.0, uncertainty: Uncertainty::NotSeen }, 1), 0);
+        assert_eq!(split(1.1, Estimate::exact(0.0), 1), 0);
+        assert_eq!(split(f64::INFINITY, Estimate::exact(1.0), 1), 0);
+    }
 }

@@ -307,4 +307,6 @@ impl EquivalenceTest {
 }
 
 #[cfg(test)]
+mod step_tests;
+#[cfg(test)]
 mod tests;

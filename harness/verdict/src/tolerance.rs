@@ -490,4 +490,124 @@ mod tests {
             table.of_class(ToleranceClass::Design).of(INDIRECT, Basis::Simulator, "radiance", UNIT, &none);
         assert_eq!((found.relative, source.as_deref()), (0.005, Some("luxproof.yaml: decided")));
     }
+
+    #[test]
+    fn a_rule_has_numbers_from_zero_and_a_source() {
+        let source = Source::new("luxproof.yaml".into(), "tolerances: []".to_owned());
+        let count = |rule: Rule| faults(&source, &[rule]).len();
+        let sound = || rule(None, None, 0.0);
+        assert_eq!(count(sound()), 0);
+        for (wrong, faults) in [
+            (Rule { relative: -0.01, ..sound() }, 1),
+            (Rule { absolute_lx: f64::NAN, ..sound() }, 1),
+            (Rule { absolute_cd: f64::INFINITY, ..sound() }, 1),
+            (Rule { absolute_cd_m2: -1.0, ..sound() }, 1),
+            (Rule { absolute_ugr: -1.0, ..sound() }, 1),
+            (Rule { source: " ".to_owned(), ..sound() }, 1),
+            (Rule { relative: -0.01, source: String::new(), ..sound() }, 2),
+        ] {
+            assert_eq!(count(wrong.clone()), faults, "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn a_class_is_complete_with_a_positive_factor_its_purpose_and_its_source() {
+        let class = |factor, purpose: &str, source: &str| {
+            Class { factor, purpose: purpose.to_owned(), source: source.to_owned() }.is_complete()
+        };
+        assert!(class(0.1, "design", "a standard"));
+        for (factor, purpose, source) in [
+            (0.0, "design", "a standard"),
+            (-1.0, "design", "a standard"),
+            (f64::INFINITY, "design", "a standard"),
+            (0.1, "", "a standard"),
+            (0.1, "design", ""),
+        ] {
+            assert!(!class(factor, purpose, source), "{factor} {purpose} {source}");
+        }
+        let entry = |why: &str, source: &str| NotClaimed { why: why.to_owned(), source: source.to_owned(), ..entry() };
+        assert!(entry("a hand method", "a book").is_complete());
+        assert!(!entry(" ", "a book").is_complete() && !entry("a hand method", "").is_complete());
+    }
+
+    /// An entry about what `mine` does not claim.
+    fn entry() -> NotClaimed {
+        NotClaimed {
+            engine: "mine".into(),
+            procedure: None,
+            basis: Basis::Simulator,
+            why: "of all".to_owned(),
+            source: "us".to_owned(),
+        }
+    }
+
+    #[test]
+    fn the_first_entry_about_a_procedure_a_basis_and_an_engine_says_what_is_not_claimed() {
+        let of_indirect = NotClaimed { procedure: Some(INDIRECT), why: "of this".to_owned(), ..entry() };
+        let not_claimed = vec![of_indirect, entry()];
+        let table = Tolerances { not_claimed, ..Tolerances::built_in().unwrap() };
+        assert_eq!(table.not_claimed(INDIRECT, Basis::Simulator, "mine"), Some("of this"));
+        assert_eq!(table.not_claimed(DIRECT, Basis::Simulator, "mine"), Some("of all"));
+        assert_eq!(table.not_claimed(INDIRECT, Basis::Published, "mine"), None);
+        assert_eq!(table.not_claimed(INDIRECT, Basis::Simulator, "radiance"), None);
+    }
+
+    #[test]
+    fn a_rule_applies_where_all_that_it_names_does() {
+        let of_both = rule(Some(Basis::Simulator), Some("radiance"), 0.02);
+        assert!(of_both.applies(INDIRECT, Basis::Simulator, "radiance"));
+        assert!(!of_both.applies(DIRECT, Basis::Simulator, "radiance"));
+        assert!(!of_both.applies(INDIRECT, Basis::Published, "radiance"));
+        assert!(!of_both.applies(INDIRECT, Basis::Simulator, "mitsuba"));
+        assert!(rule(None, None, 0.02).applies(INDIRECT, Basis::Published, "mitsuba"));
+        let specificities = [(None, None), (Some(Basis::Simulator), None), (None, Some("a"))]
+            .map(|(basis, engine)| rule(basis, engine, 0.0).specificity());
+        assert_eq!((specificities, of_both.specificity()), ([0, 1, 2], 3));
+    }
+
+    #[test]
+    fn a_class_widens_what_our_rules_allow_relative_to_a_reference() {
+        // The class `design` is five times as wide as ours, `reference` a tenth.
+        let table = table_of(vec![rule(None, None, 0.02)]);
+        let none = BTreeMap::new();
+        for (class, relative, source) in [
+            (ToleranceClass::Verification, 0.02, None),
+            (ToleranceClass::Design, 0.1, Some("class design, lighting design")),
+            (ToleranceClass::Reference, 0.002, Some("class reference, values that others are held to")),
+        ] {
+            let table = table.clone().of_class(class);
+            let (found, origin) = table.of(INDIRECT, Basis::Simulator, "radiance", UNIT, &none);
+            assert!((found.relative - relative).abs() < 1e-15 && found.absolute == 1.0, "{class} {found:?}");
+            assert_eq!(origin.is_some(), source.is_some(), "{class}");
+            assert!(source.is_none_or(|source| origin.unwrap().starts_with(source)), "{class}");
+            // A spec widens where it is above the class.
+            for (asked, widens) in [(0.999 * relative, false), (1.001 * relative, true)] {
+                let asked = ToleranceOverride { relative: asked, ..Default::default() };
+                assert_eq!(table.is_widened_by(INDIRECT, &asked), widens, "{class} {asked:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_tolerance_has_the_source_of_the_rule_that_decides_it() {
+        let none = BTreeMap::new();
+        let project = table_of(vec![]).with(&[rule(None, None, 0.02)], "ours.yaml");
+        for (relative, found, source) in [
+            (0.01, 0.01, "theirs.yaml: decided"),
+            (0.02, 0.02, "ours.yaml: decided"),
+            (0.03, 0.02, "ours.yaml: decided"),
+        ] {
+            let table = project.clone().narrowed_by(&[rule(None, None, relative)], "theirs.yaml");
+            let (tolerance, origin) = table.of(INDIRECT, Basis::Simulator, "radiance", UNIT, &none);
+            assert_eq!((tolerance.relative, origin.as_deref()), (found, Some(source)), "{relative}");
+        }
+        // A spec that narrows takes the place of the source.
+        for (relative, source) in [(0.01, None), (0.02, Some("ours.yaml: decided")), (0.03, Some("ours.yaml: decided"))]
+        {
+            let of_spec = ToleranceOverride { relative, absolute_lx: 9.0, ..Default::default() };
+            let overrides = BTreeMap::from([(INDIRECT, of_spec)]);
+            let (_, origin) = project.narrowed_for(INDIRECT, Basis::Simulator, "radiance", UNIT, &overrides);
+            assert_eq!(origin.as_deref(), source, "{relative}");
+        }
+    }
 }

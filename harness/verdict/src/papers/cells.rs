@@ -115,3 +115,160 @@ fn cell(
         note: misfit.or(why_not_read),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use luxproof_model::{ErrorBudget, Estimate, MeterId, ProcedureId, Quantity, Reference, Uncertainty};
+
+    use super::*;
+    use crate::fixtures::{built_in, recording, task};
+
+    /// A reading of the first meter with this bound, compared with a printed column.
+    fn comparison(engine: &str, value: f64, bound: f64, column: &str) -> Comparison {
+        let exact = recording("simulator", &[Estimate::exact(10.0)]);
+        let subject = recording(engine, &[Estimate { value, uncertainty: Uncertainty::Bound(bound) }]);
+        let mut comparison = built_in().compare_one(&task(1), &subject, &[&exact, &subject]).remove(0);
+        let source = format!("A paper, Table 2, {column}: as rendered");
+        comparison.reference = Some(Reference::of(10.0, &Uncertainty::Bound(0.5), Basis::Published, source));
+        comparison
+    }
+
+    fn column(name: &str, engine: &str) -> PublishedColumn {
+        PublishedColumn {
+            name: name.to_owned(),
+            reference: false,
+            meaning: "as rendered".to_owned(),
+            engine: engine.to_owned(),
+            model: "point".to_owned(),
+        }
+    }
+
+    fn row(row: usize, cells: &[(&str, &str)]) -> PublishedRow {
+        let cells: BTreeMap<String, String> =
+            cells.iter().map(|(name, cell)| ((*name).to_owned(), (*cell).to_owned())).collect();
+        PublishedRow { meter: MeterId::new("grid", row), place: format!("{row}"), row, cells }
+    }
+
+    /// A report with a table of one column, `lum`, whose first cell is 10.0 within .5.
+    fn report(comparisons: Vec<Comparison>) -> Report {
+        let table = PublishedTable {
+            title: "A paper".to_owned(),
+            name: "Table 2".to_owned(),
+            procedure: ProcedureId::IndirectIlluminance,
+            quantity: Quantity::Illuminance,
+            cases: vec!["c".to_owned()],
+            bounces: None,
+            units_in_last_digit: 5.0,
+            flux: None,
+            columns: vec![column("lum", "radiance")],
+            rows: vec![row(0, &[("lum", "10.0")])],
+            misfits: vec![],
+        };
+        Report { published: vec![table], comparisons, ..Report::default() }
+    }
+
+    fn first(report: &Report) -> Cell {
+        cells(report, 2.0).remove(0)
+    }
+
+    #[test]
+    fn a_cell_is_reproduced_where_the_whole_interval_is_within_its_rounding() {
+        for (value, bound, standing) in [
+            (10.4, 0.0, Standing::Reproduced),
+            (10.6, 0.0, Standing::NotReproduced),
+            (9.4, 0.0, Standing::NotReproduced),
+            (10.4, 0.2, Standing::Undecided),
+            (f64::NAN, 0.0, Standing::NotRead),
+        ] {
+            let found = first(&report(vec![comparison("radiance", value, bound, "lum")]));
+            assert_eq!(found.standing, standing, "{value} {bound}");
+            assert_eq!((found.rounding, found.printed.as_str(), found.unit), (0.5, "10.0", "lx"));
+        }
+    }
+
+    #[test]
+    fn the_interval_of_a_reading_is_without_the_rounding_of_the_cell() {
+        let mut compared = comparison("radiance", 10.1, 0.3, "lum");
+        let rounding = luxproof_model::Component::within(Source::Rounding, 0.5);
+        let budget = compared.budget.clone().unwrap();
+        let components = budget.components.iter().copied().chain([rounding]).collect();
+        compared.budget = Some(ErrorBudget { components, ..budget });
+        let found = first(&report(vec![compared]));
+        // 95.45 % of a bound are within two standard deviations of a normal distribution.
+        assert!((found.uncertainty.unwrap() - 0.9545 * 0.3).abs() < 1e-4, "{found:?}");
+        assert_eq!((found.computed, found.fits_table, found.note), (Some(10.1), true, None));
+    }
+
+    #[test]
+    fn a_cell_has_the_reading_of_its_engine_meter_case_procedure_and_column() {
+        let right = comparison("radiance", 10.1, 0.0, "lum");
+        assert_eq!(first(&report(vec![right.clone()])).computed, Some(10.1));
+        let mut others = vec![comparison("mitsuba", 10.1, 0.0, "lum"), comparison("radiance", 10.1, 0.0, "other")];
+        others.push(Comparison { meter: MeterId::new("grid", 1), ..right.clone() });
+        for key in [
+            luxproof_model::ReadingKey::new("d", ProcedureId::IndirectIlluminance, "radiance"),
+            luxproof_model::ReadingKey::new("c", ProcedureId::DirectIlluminance, "radiance"),
+        ] {
+            others.push(Comparison { key, ..right.clone() });
+        }
+        let mut simulated = right.clone();
+        simulated.reference.as_mut().unwrap().basis = Basis::Simulator;
+        others.extend([simulated, Comparison { reference: None, ..right }]);
+        for other in others {
+            let found = first(&report(vec![other.clone()]));
+            assert_eq!((found.computed, found.standing), (None, Standing::NotRead), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn readings_precede_missing_ones_and_the_model_of_the_column_others() {
+        let right = comparison("radiance", 10.1, 0.0, "lum");
+        let why = Some("out of memory".to_owned());
+        let missing = Comparison { value: None, budget: None, diagnosis: why.clone(), ..right.clone() };
+        let of_areas = Comparison { model: "area".to_owned(), value: Some(10.2), ..right.clone() };
+        let found = first(&report(vec![missing.clone(), of_areas.clone()]));
+        assert_eq!((found.computed, found.model.as_str(), found.note), (Some(10.2), "area", None));
+        let found = first(&report(vec![of_areas, right]));
+        assert_eq!((found.computed, found.model.as_str()), (Some(10.1), "point"));
+        assert_eq!(first(&report(vec![missing])).note, why);
+    }
+
+    #[test]
+    fn a_misfit_is_noted_at_its_own_cell() {
+        for (row, column, fits) in [(0, "lum", false), (1, "lum", true), (0, "other", true)] {
+            let mut report = report(vec![comparison("radiance", 10.1, 0.0, "lum")]);
+            report.published[0].misfits = vec![Misfit {
+                row,
+                column: column.to_owned(),
+                printed: "10.0".to_owned(),
+                expected: 20.0,
+                half_width: 0.1,
+                by: vec!["lum2".to_owned()],
+            }];
+            let found = first(&report);
+            assert_eq!((found.fits_table, found.note.is_none()), (fits, fits), "{row} {column}");
+        }
+    }
+
+    #[test]
+    fn cells_are_in_the_order_of_the_paper_each_once_and_photometry_is_read_by_hand() {
+        let mut report = report(vec![]);
+        let table = &mut report.published[0];
+        table.columns.push(column("file", PHOTOMETRY));
+        let cells_of_row = [("lum", "1"), ("file", "2")];
+        table.rows = vec![row(2, &cells_of_row), row(0, &cells_of_row), row(0, &cells_of_row), row(1, &[("lum", "3")])];
+        let mut earlier = table.clone();
+        earlier.procedure = ProcedureId::LuminousIntensity;
+        earlier.rows.truncate(1);
+        report.published.push(earlier);
+        let found = cells(&report, 2.0);
+        let places = found.iter().map(|c| (c.place.as_str(), c.column.as_str(), c.engine.as_str())).collect_vec();
+        let [lum, file] = [("lum", "radiance"), ("file", "iesna")];
+        let of = |place, (column, engine)| (place, column, engine);
+        let expected =
+            [of("2", lum), of("2", file), of("0", lum), of("0", file), of("1", lum), of("2", lum), of("2", file)];
+        assert_eq!(places, expected);
+    }
+}

@@ -157,6 +157,9 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 #[cfg(test)]
+mod step_tests;
+
+#[cfg(test)]
 mod tests {
     use std::path::Path;
 

@@ -95,4 +95,63 @@ mod tests {
         assert_eq!(last_digit_cd(&table(vec![664.4, 35.25])), Some(0.01));
         assert_eq!(last_digit_cd(&table(vec![1.0 / 3.0, 35.25])), None);
     }
+
+    use crate::fixtures;
+    use glam::DVec3;
+    use luxproof_engines::fixtures::luminaire;
+    use luxproof_scene::Meter;
+
+    fn are_close(a: f64, b: f64) -> bool {
+        (a - b).abs() <= 1e-6 * b.abs()
+    }
+
+    /// A luminaire with the same intensity in all directions, at 2 m above the origin.
+    fn sphere(candela: f64, flux_scale: f64) -> Luminaire {
+        let table = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![candela; 2]).unwrap();
+        Luminaire { flux_scale, ..luminaire("sphere", DVec3::new(0.0, 0.0, 2.0), table) }
+    }
+
+    /// A task of one meter under two spheres: 100 cd to 1 cd, doubled, and 50.5 cd to .1 cd, trebled.
+    fn task_below_spheres(transport: Transport) -> Task {
+        let mut task = Task { transport, ..fixtures::task(1) };
+        task.scene.luminaires = vec![sphere(100.0, 2.0), sphere(50.5, 3.0)];
+        task
+    }
+
+    #[test]
+    fn reflected_light_is_as_uncertain_as_all_flux_together() {
+        let mut task = task_below_spheres(fixtures::task(0).transport);
+        // Half digits of 1 cd and .15 cd, of 200 cd and 151.5 cd.
+        assert_eq!(Input::of(&task).half_digits_cd, [1.0, 0.5 * 0.1 * 3.0]);
+        let relative = 1.15 / 351.5;
+        for value in [10.0, -10.0] {
+            let found = Input::of(&task).bound(&task.targets[0], value);
+            assert!(are_close(found, 10.0 * relative), "{value} {found}");
+        }
+        // A rating is eight times a decimal logarithm, of intensities twice and of the background once.
+        let rating = Target { made: ReadingKind::Rating { glare: 1.0 }, ..task.targets[0].clone() };
+        let found = Input::of(&task).bound(&rating, 10.0);
+        assert!(are_close(found, 24.0 / 10f64.ln() * relative), "{found}");
+        task.scene.luminaires.clear();
+        assert_eq!(Input::of(&task).bound(&task.targets[0], 10.0), 0.0);
+    }
+
+    #[test]
+    fn direct_light_is_as_uncertain_as_each_intensity_at_its_distance() {
+        let mut task = task_below_spheres(Transport::Direct);
+        let up = Meter { position_m: DVec3::ZERO, normal: DVec3::Z };
+        let tilted = Meter { normal: DVec3::new(0.75f64.sqrt(), 0.0, 0.5), ..up };
+        // 1.15 cd at 2 m, straight and at 60 degrees, with weights of 3 and 5.
+        task.targets[0].aspects = vec![Aspect { meter: up, weight: 3.0 }, Aspect { meter: tilted, weight: 5.0 }];
+        let found = Input::of(&task).bound(&task.targets[0], 10.0);
+        assert!(are_close(found, (3.0 + 2.5) * 1.15 / 4.0), "{found}");
+        let away = Meter { normal: DVec3::NEG_Z, ..up };
+        task.targets[0].aspects = vec![Aspect { meter: away, weight: 3.0 }];
+        assert_eq!(Input::of(&task).bound(&task.targets[0], 10.0), 0.0);
+        // A luminaire without light in this direction has no digit there.
+        let dark = Luminaire { photometry: table(vec![100.0, 100.0]).into(), ..sphere(1.0, 1.0) };
+        let above = Meter { position_m: DVec3::new(0.0, 0.0, 4.0), normal: DVec3::NEG_Z };
+        assert_eq!(direct_light_error(&dark, 0.5, &Aspect { meter: above, weight: 1.0 }), 0.0);
+        assert!(direct_light_error(&dark, 0.5, &Aspect { meter: up, weight: 1.0 }) > 0.0);
+    }
 }

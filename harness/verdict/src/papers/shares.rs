@@ -113,4 +113,39 @@ mod tests {
         assert!(photometry.uncertainty >= expected);
         assert!(whole.uncertainty < 0.01 && renderer.uncertainty < 0.01);
     }
+
+    #[test]
+    fn each_share_is_its_steps_relative_to_the_printed_calculation_with_the_errors_of_their_ends() {
+        let stages = Stages {
+            printed_method: stage(10.0, 1.0),
+            method: stage(11.0, 2.0),
+            exact: stage(13.0, 3.0),
+            exact_cut: stage(16.0, 4.0),
+            exact_model: stage(20.0, 5.0),
+            rendered: stage(25.0, 6.0),
+            printed: stage(31.0, 7.0),
+        };
+        // A tenth of 11, as a standard uncertainty.
+        let flux = PublishedFlux { value_lm: 400.0, half_width_lm: 40.0 * 3f64.sqrt(), source: "test".into() };
+        let by_flux = 1.21;
+        let found = shares(&stages, Some(&flux), 3.0);
+        for (share, value, variance) in [
+            (&found[0], 2.1, 1.0 + 49.0),
+            (&found[1], 0.2, 4.0 + 9.0 + by_flux),
+            (&found[2], 0.1 + 0.4, 1.0 + 4.0 + 16.0 + 25.0 + by_flux),
+            (&found[3], 0.3 + 0.5, 9.0 + 16.0 + 25.0 + 36.0),
+            (&found[4], 0.6, 36.0 + 49.0),
+        ] {
+            assert!((share.value - value).abs() < 1e-12, "{share:?} {value}");
+            assert!((share.uncertainty - 0.3 * f64::sqrt(variance)).abs() < 1e-12, "{share:?} {variance}");
+        }
+    }
+
+    #[test]
+    fn a_stage_between_two_steps_cancels_with_its_error() {
+        let scale = ShareScale { unit: 10.0, coverage: 2.0 };
+        let (from, between, to) = (stage(10.0, 3.0), stage(14.0, 9.0), stage(15.0, 4.0));
+        let share = scale.share(&[(from, between), (between, to)], 0.0);
+        assert!((share.value - 0.5).abs() < 1e-12 && (share.uncertainty - 1.0).abs() < 1e-12, "{share:?}");
+    }
 }

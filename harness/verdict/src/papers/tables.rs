@@ -510,6 +510,9 @@ fn is_same(angle_deg: Option<f64>, other_deg: f64) -> bool {
 }
 
 #[cfg(test)]
+mod step_tests;
+
+#[cfg(test)]
 mod tests {
     use luxproof_model::MeterId;
     use luxproof_model::Uncertainty;
