@@ -283,6 +283,8 @@ mod tests {
         // In a furnace every meter reads the exitance, wherever it looks.
         let turned = Meter { position_m: DVec3::new(0.3, 1.1, 0.7), normal: DVec3::new(0.6, 0.0, -0.8) };
         assert_relative_eq!(solved.indirect_illuminance(&turned).value(), 100.0, max_relative = 1e-12);
+        let on_the_floor = Meter { position_m: DVec3::new(0.3, 1.1, 0.0), normal: DVec3::Z };
+        assert_relative_eq!(solved.indirect_illuminance(&on_the_floor).value(), 100.0, max_relative = 1e-12);
         // A square of 2 m at 2 m, seen from its axis: four times a / sqrt(a^2 + h^2) atan(a / sqrt(a^2 + h^2)) / pi.
         let ceiling = Surface::ALL.iter().position(|s| *s == Surface::Ceiling).unwrap();
         solved.exitance = [LumenPerSquareMetre(0.0); 6];

@@ -17,9 +17,6 @@ const MAX_REFLECTIONS: u32 = 60;
 /// Part of the brightest patch's light below which light is followed no further.
 const NEGLIGIBLE_SHARE: f64 = 1e-4;
 
-/// A meter so near to the plane of a surface lies in it.
-const SAME_PLANE_M: f64 = 1e-9;
-
 struct Patch {
     surface: Surface,
     corners_m: [DVec3; 4],
@@ -91,27 +88,13 @@ fn weighted_sum(factors: &[f64], exitance: &[f64]) -> f64 {
 /// Configuration factors from a patch's centre, normalized to 1, because a closed room is all that a patch sees.
 fn factors_of_patch(patch: &Patch, patches: &[Patch]) -> Vec<f64> {
     let (centre, normal) = (patch.at(0.5, 0.5), patch.surface.inward_normal());
-    let mut factors = vec![];
-    for other in patches {
-        let is_on_another_surface = other.surface != patch.surface;
-        factors.push(if is_on_another_surface { element_to_polygon(centre, normal, &other.corners_m) } else { 0.0 });
-    }
+    let factors: Vec<f64> = patches.iter().map(|other| element_to_polygon(centre, normal, &other.corners_m)).collect();
     let all: f64 = factors.iter().sum();
     factors.into_iter().map(|factor| factor / all).collect()
 }
 
 fn factors_of_meter(meter: &Meter, patches: &[Patch]) -> Vec<f64> {
-    patches.iter().map(|patch| factor_of_meter(meter, patch)).collect()
-}
-
-/// The configuration factor of a patch; none where the meter lies in its plane, which the polygon formula takes for all that it sees.
-fn factor_of_meter(meter: &Meter, patch: &Patch) -> f64 {
-    let distance_m = (meter.position_m - patch.corners_m[0]).dot(patch.surface.inward_normal());
-    if distance_m.abs() < SAME_PLANE_M {
-        0.0
-    } else {
-        element_to_polygon(meter.position_m, meter.normal, &patch.corners_m)
-    }
+    patches.iter().map(|patch| element_to_polygon(meter.position_m, meter.normal, &patch.corners_m)).collect()
 }
 
 impl Patch {

@@ -8,12 +8,22 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
+/// A polygon with corners that rise above an element's plane by less than this part of their distance lies in it.
+const IN_PLANE: f64 = 1e-12;
+
 /// Factor from an element at `point_m` of unit `normal` to a flat polygon, either winding, clipped at the horizon.
+///
+/// A polygon in the element's own plane is not seen, although Lambert's formula gives 1 inside of it.
 ///
 /// Lambert's formula, c = 1/2π Σ θ (Γ · n): θ is the angle that an edge subtends and Γ the unit normal of the plane
 /// through the edge and the element. Angles come from `atan2`: `acos` loses ten digits on small patches.
 pub fn element_to_polygon(point_m: DVec3, normal: DVec3, polygon_m: &[DVec3]) -> f64 {
-    signed_element_to_polygon(point_m, normal, polygon_m).abs()
+    let mut offsets = polygon_m.iter().map(|corner| *corner - point_m);
+    if offsets.any(|offset| offset.dot(normal) > IN_PLANE * offset.length()) {
+        signed_element_to_polygon(point_m, normal, polygon_m).abs()
+    } else {
+        0.0
+    }
 }
 
 /// As [`element_to_polygon`], positive where the polygon turns clockwise as the element sees it.
@@ -155,6 +165,21 @@ mod tests {
             let polygon = element_to_polygon(DVec3::ZERO, DVec3::Z, &beside);
             assert_relative_eq!(polygon, element_to_perpendicular_rectangle(a, b, d), max_relative = 1e-9);
         }
+    }
+
+    #[test]
+    fn a_polygon_in_the_plane_of_the_element_is_not_seen() {
+        let flat = |z: f64| [(-1.0, -2.0), (1.0, -2.0), (1.0, 3.0), (-1.0, 3.0)].map(|(x, y)| DVec3::new(x, y, z));
+        for inside in [DVec3::ZERO, DVec3::new(0.9, 2.0, 0.0), DVec3::new(5.0, 0.0, 0.0)] {
+            assert_eq!(element_to_polygon(inside, DVec3::Z, &flat(0.0)), 0.0);
+            assert_eq!(element_to_polygon(inside, DVec3::Z, &flat(-1e-9)), 0.0);
+        }
+        // A nanometre above the element it fills all that the element sees.
+        assert_relative_eq!(element_to_polygon(DVec3::ZERO, DVec3::Z, &flat(1e-9)), 1.0, max_relative = 1e-8);
+        // In a tilted plane, to rounding.
+        let turn = glam::DMat3::from_rotation_x(0.7);
+        let tilted = flat(0.0).map(|corner| turn * corner + DVec3::splat(7.3));
+        assert_eq!(element_to_polygon(DVec3::splat(7.3), turn * DVec3::Z, &tilted), 0.0);
     }
 
     #[test]
