@@ -106,3 +106,96 @@ fn file_fields(photometry: &Photometry) -> Vec<(&'static str, f64)> {
     fields.retain(|(_, value)| value.is_normal() && *value > 0.0 && (value - 1.0).abs() > 1e-9);
     fields
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use glam::DVec3;
+    use luxproof_engines::fixtures;
+    use luxproof_photometry::LuminousIntensityDistribution;
+
+    /// A luminaire with these candela at the nadir, at 90 degrees and above, dimmed to a half, with 2000 lamp lumens.
+    fn lamp(nadir_cd: f64, other_cd: f64) -> Luminaire {
+        let table = LuminousIntensityDistribution::axial(vec![0.0, 90.0, 180.0], vec![nadir_cd, other_cd, other_cd]);
+        let mut lamp = fixtures::luminaire("lamp", DVec3::ZERO, table.unwrap());
+        Arc::make_mut(&mut lamp.photometry).lamp_lumens = Some(2000.0);
+        lamp.flux_scale = 0.5;
+        lamp
+    }
+
+    fn is_near(found: Option<f64>, expected: f64) -> bool {
+        found.is_some_and(|found| (found / expected - 1.0).abs() < 1e-9)
+    }
+
+    #[test]
+    fn factors_of_a_table_follow_from_its_peak_nadir_flux_and_lamp_lumens() {
+        // 100 cd on all sides, dimmed to a half: 50 cd and 200 pi lm.
+        let even = lamp(100.0, 100.0);
+        let expected = [
+            1.0 / 50.0,
+            1.0 / (200.0 * PI),
+            1.0 / 50.0,
+            4.0 * PI,
+            1.0 / (4.0 * PI),
+            200.0 * PI,
+            50.0,
+            10.0 / PI,
+            5.0 / PI,
+            20.0,
+            0.02,
+            4.0,
+        ];
+        for ((what, factor), expected) in TABLE_FACTORS.into_iter().chain(TABLE_MULTIPLES).zip(expected) {
+            assert!(is_near(factor(&even, 0.5), expected), "{what}: {:?}", factor(&even, 0.5));
+        }
+        // The peak is not at the nadir.
+        let uneven = lamp(100.0, 250.0);
+        assert!(is_near(peak_cd(&uneven, 0.5), 125.0) && is_near(nadir_cd(&uneven, 0.5), 50.0));
+        // As in the file, and as dimmed as the luminaire.
+        assert!(is_near(dimmed(peak_cd, false)(&uneven), 250.0) && is_near(dimmed(peak_cd, true)(&uneven), 125.0));
+    }
+
+    #[test]
+    fn what_is_zero_or_not_stated_has_no_factor() {
+        let dark = lamp(0.0, 0.0);
+        assert_eq!([peak_cd(&dark, 1.0), flux_lm(&dark, 1.0), nadir_cd(&dark, 1.0)], [None; 3]);
+        let upwards = lamp(0.0, 100.0);
+        assert!(nadir_cd(&upwards, 1.0).is_none() && peak_cd(&upwards, 1.0).is_some());
+        for lumens in [None, Some(0.0), Some(-1.0)] {
+            let mut unstated = lamp(100.0, 100.0);
+            Arc::make_mut(&mut unstated.photometry).lamp_lumens = lumens;
+            assert_eq!(lamp_lumens(&unstated), None);
+        }
+    }
+
+    /// The photometry of a file.
+    fn read(text: &str) -> Photometry {
+        luxproof_photometry::read_by(std::path::Path::new("lamp.ies"), &|_| Ok(text.as_bytes().to_vec())).unwrap()
+    }
+
+    #[test]
+    fn a_file_has_the_factors_that_are_not_one() {
+        let text = "IESNA:LM-63-1995\nTILT=NONE\n3 1000 2 2 1 1 2 0 0 0\n0.9 0.8 100\n0 90\n0\n100 50\n";
+        let fields = file_fields(&read(text));
+        let expected = [
+            ("the candela multiplier", 2.0),
+            ("the ballast factor", 0.9),
+            ("the ballast-lamp factor", 0.8),
+            ("the number of lamps", 3.0),
+            ("the product of all multipliers", 1.44),
+        ];
+        assert_eq!(fields.len(), expected.len(), "{fields:?}");
+        for ((name, value), (expected_name, expected_value)) in fields.iter().zip(expected) {
+            assert!(*name == expected_name && (value - expected_value).abs() < 1e-12, "{fields:?}");
+        }
+        let plain = file_fields(&read(&text.replace("3 1000 2 ", "1 1000 1 ").replace("0.9 0.8", "1 1")));
+        assert_eq!(plain, []);
+        assert_eq!(file_fields(&lamp(100.0, 100.0).photometry), []);
+        let mut of_file = lamp(100.0, 100.0);
+        of_file.photometry = Arc::new(read(text));
+        assert!(is_near(field_of(&of_file, "the ballast factor"), 0.9));
+        assert_eq!(field_of(&of_file, "the conversion factor"), None);
+    }
+}

@@ -248,3 +248,48 @@ fn flux_kind(id: &str) -> Fault {
         .about(format!("flux of {id}"))
         .with_parameters([Parameter::new("", 1.0, 0.05, (0.0, 1e4))])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use luxproof_engines::fixtures;
+
+    #[test]
+    fn a_scaled_reflectance_is_limited_unless_it_was_larger_before() {
+        for (reflectance, factor, expected) in
+            [(0.5, 1.5, 0.75), (0.5, 3.0, 0.995), (0.999, 3.0, 0.999), (0.999, 0.5, 0.4995), (0.4, 0.0, 0.0)]
+        {
+            let found = scale_reflectance(reflectance, factor);
+            assert!((found - expected).abs() < 1e-12, "{reflectance} {factor}: {found}");
+        }
+    }
+
+    /// Where the axes x, y and z of a luminaire point after a tilt.
+    fn axes_after_tilt(angles_deg: [f64; 2]) -> [DVec3; 3] {
+        let mut lamp = fixtures::luminaire("lamp", DVec3::ZERO, fixtures::axial_uplight());
+        lamp.orientation = DMat3::IDENTITY;
+        tilt_luminaire(&mut lamp, &angles_deg);
+        [lamp.orientation.x_axis, lamp.orientation.y_axis, lamp.orientation.z_axis]
+    }
+
+    #[test]
+    fn a_tilt_turns_about_x_and_y_and_none_leaves_the_luminaire() {
+        let half = 0.5 * 2f64.sqrt();
+        for (angles_deg, axes) in [
+            ([0.0, 0.0], [DVec3::X, DVec3::Y, DVec3::Z]),
+            ([90.0, 0.0], [DVec3::X, DVec3::Z, -DVec3::Y]),
+            ([0.0, 90.0], [-DVec3::Z, DVec3::Y, DVec3::X]),
+            ([-45.0, 0.0], [DVec3::X, DVec3::new(0.0, half, -half), DVec3::new(0.0, half, half)]),
+        ] {
+            let found = axes_after_tilt(angles_deg);
+            assert!(found.iter().zip(axes).all(|(f, e)| (*f - e).length() < 1e-12), "{angles_deg:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn fits_of_a_turn_start_all_round_the_circle() {
+        let starts = turn_angle().starts;
+        assert_eq!((starts.len(), starts[0], starts[5], starts[11]), (12, -150.0, 0.0, 180.0));
+        assert_eq!((turn_angle().period, tilt_angle().period), (Some(360.0), None));
+    }
+}

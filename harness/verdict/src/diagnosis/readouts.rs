@@ -120,4 +120,46 @@ mod tests {
         assert_eq!(find_step(vec![300.0, 301.0, 302.0, 305.0]), None);
         assert!(find_step(vec![100.0, 101.0, 102.0, 105.0]).is_some());
     }
+
+    #[test]
+    fn a_step_is_refined_by_readings_that_are_near_a_multiple() {
+        for (values, refined) in [
+            // Twice 1.05; three tenths of a step away is no multiple, and less than half a step is none of it.
+            (&[2.1][..], 1.05),
+            (&[2.3], 1.0),
+            (&[0.4], 1.0),
+            (&[0.8], 0.8),
+            // 5 / 1.05 = 4.76 counts as five.
+            (&[2.1, 5.0], 1.0),
+        ] {
+            assert!((refine_step(values, 1.0) - refined).abs() < 1e-12, "{values:?}");
+        }
+    }
+
+    #[test]
+    fn a_step_is_common_within_two_hundredths_and_above_a_two_hundredth_of_the_least_reading() {
+        for (values, is_common) in [
+            (&[1.0, 2.019][..], true),
+            (&[1.0, 1.981], true),
+            (&[1.0, 2.021], false),
+            (&[1.0, 1.979], false),
+            (&[199.0], true),
+            (&[200.0], false),
+            (&[201.0], false),
+        ] {
+            assert_eq!(is_common_step(values, 1.0), is_common, "{values:?}");
+        }
+    }
+
+    #[test]
+    fn four_different_readings_show_a_step() {
+        assert!(find_step(vec![2.0, 4.0, 6.0, 10.0]).is_some_and(|step| (step - 2.0).abs() < 1e-12));
+        assert_eq!(find_step(vec![2.0, 4.0, 6.0]), None);
+        // Readings within a ten-thousandth are one.
+        assert_eq!(find_step(vec![2.0, 4.0, 6.0, 6.000_5]), None);
+        assert!(find_step(vec![2.0, 4.0, 6.0, 6.000_5, 10.0]).is_some_and(|step| (step - 2.0).abs() < 1e-3));
+        // An eighth of the smallest difference is the smallest step tried.
+        assert!(find_step(vec![8.0, 17.0, 28.0, 41.0]).is_some_and(|step| (step - 1.0).abs() < 1e-12));
+        assert_eq!(find_step(vec![9.0, 19.0, 30.0, 43.0]), None);
+    }
 }
