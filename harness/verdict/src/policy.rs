@@ -397,4 +397,140 @@ profiles: {ci: {budget: {relative_error: 0.005}, sampling: decided}, audit: {}}
         assert!(error.to_string().contains("did you mean `audit`?"), "{error}");
         assert!(read("profiles: {}\n", None).is_ok());
     }
+
+    /// What the reader says of a policy, of specs that bring these engines with them.
+    fn message(text: &str, declared: &[&str]) -> Option<String> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(POLICY_FILE);
+        std::fs::write(&file, text).unwrap();
+        let declared = declared.iter().copied().collect();
+        let read = PolicyChoice::default().read(Some(&file), Trust::Own, &declared);
+        read.err().map(|faults| faults.all().iter().join(" "))
+    }
+
+    #[test]
+    fn an_engine_that_is_nearly_one_of_ours_and_not_a_specs_own_is_misspelt() {
+        let says = |text: &str, declared: &[&str]| message(text, declared).is_some_and(|m| m.contains("did you mean"));
+        assert!(says("required_engines: [radianse]", &[]) && says("required_engines: [radianse@5]", &[]));
+        assert!(!says("required_engines: [radianse]", &["radianse"]) && !says("required_engines: [radiance]", &[]));
+        assert!(!says("required_engines: [quite_another]", &[]));
+        let rule = "tolerances: [{procedure: direct_illuminance, engine: radianse, relative: 0.01, source: us}]";
+        assert!(says(rule, &[]));
+    }
+
+    #[test]
+    fn a_policy_requires_a_hundred_engines_at_most() {
+        let requiring = |count| format!("required_engines: [{}]", vec!["radiance"; count].join(", "));
+        assert_eq!(message(&requiring(100), &[]), None);
+        assert!(message(&requiring(101), &[]).is_some_and(|m| m.contains("more than 100 engines")));
+    }
+
+    #[test]
+    fn a_budget_is_a_positive_number() {
+        for (budget, is_one) in [
+            ("relative_error: 0.01", true),
+            ("seconds: 1", true),
+            ("seconds: 0", false),
+            ("seconds: -1", false),
+            ("seconds: .inf", false),
+            ("relative_error: .nan", false),
+        ] {
+            let found = message(&format!("profiles: {{ci: {{budget: {{{budget}}}}}}}"), &[]);
+            assert_eq!(found.is_none(), is_one, "{budget}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn without_a_policy_there_is_a_class_and_no_profile() {
+        let design = Some(ToleranceClass::Design);
+        let choice = PolicyChoice { tolerance_class: design, ..PolicyChoice::default() };
+        let policy = choice.read(None, Trust::Own, &BTreeSet::new()).unwrap();
+        assert!(policy.tolerances.decision_rule().contains("class design") && policy.record.is_none());
+        let choice = PolicyChoice { profile: Some("ci".to_owned()), ..choice };
+        assert!(choice.read(None, Trust::Own, &BTreeSet::new()).unwrap_err().to_string().contains("`ci`"));
+    }
+
+    /// A case below a folder, whose spec is trusted so far.
+    fn case_in(folder: &Path, name: &str, trust: Trust) -> Case {
+        let path = folder.join(name);
+        let mut source = Source::new(path.clone(), String::new());
+        source.trust = trust;
+        Case { path, source, ..Case::default() }
+    }
+
+    #[test]
+    fn the_nearest_policy_is_followed_up_to_the_root_of_a_bundle_unless_a_stranger_proposes_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("inner");
+        std::fs::create_dir(&inner).unwrap();
+        std::fs::write(folder.path().join(POLICY_FILE), "").unwrap();
+        let find = |trust| PolicySearch::AroundSpecs.find(&case_in(&inner, "a.yaml", trust));
+        assert_eq!(find(Trust::Own), Some(folder.path().join(POLICY_FILE)));
+        assert_eq!((find(Trust::Bundled), find(Trust::Stranger)), (find(Trust::Own), None));
+        assert_eq!(PolicySearch::Nowhere.find(&case_in(&inner, "a.yaml", Trust::Own)), None);
+        std::fs::write(inner.join(BUNDLE_FILE), "").unwrap();
+        assert_eq!(find(Trust::Own), None);
+        std::fs::write(inner.join(POLICY_FILE), "").unwrap();
+        assert_eq!(find(Trust::Own), Some(inner.join(POLICY_FILE)));
+    }
+
+    #[test]
+    fn a_faulty_policy_is_reported_once_for_all_of_its_cases() {
+        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        let mut cases = vec![];
+        for folder in &folders {
+            std::fs::write(folder.path().join(POLICY_FILE), "profiles: {ci: {budget: {seconds: 0}}}").unwrap();
+            cases.extend(["a.yaml", "b.yaml"].map(|name| case_in(folder.path(), name, Trust::Own)));
+        }
+        let faults = PolicyChoice::default().of_cases(&cases).unwrap_err();
+        assert_eq!(faults.all().len(), 2, "{faults}");
+        let policies = PolicyChoice { search: PolicySearch::Nowhere, ..PolicyChoice::default() }.of_cases(&cases);
+        assert_eq!(policies.unwrap().len(), 4);
+    }
+
+    #[test]
+    fn what_a_stranger_proposes_beyond_narrower_tolerances_is_overruled() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(POLICY_FILE), "").unwrap();
+        let choice = PolicyChoice::default();
+        let ours = Arc::new(Policy::built_in().unwrap());
+        let count = |case: &Case, policy: &Arc<Policy>, choice: &PolicyChoice| {
+            overruled(std::slice::from_ref(case), std::slice::from_ref(policy), choice).len()
+        };
+        let [own, mut stranger] = [Trust::Own, Trust::Stranger].map(|trust| case_in(folder.path(), "a.yaml", trust));
+        assert_eq!((count(&own, &ours, &choice), count(&stranger, &ours, &choice)), (0, 1));
+        // A policy that was found around the current folder only narrows; one that the user names is the user's own.
+        let record = PolicyRecord {
+            file: "luxproof.yaml".to_owned(),
+            sha256: String::new(),
+            profile: None,
+            required_engines: vec![],
+        };
+        let found = Arc::new(Policy { record: Some(record), ..Policy::built_in().unwrap() });
+        let named = PolicyChoice { file: Some("luxproof.yaml".into()), ..PolicyChoice::default() };
+        assert_eq!((count(&stranger, &found, &choice), count(&stranger, &found, &named)), (2, 1));
+        let relative = |relative| luxproof_spec::ToleranceOverride { relative, ..Default::default() };
+        stranger.tolerances.insert(ProcedureId::DirectIlluminance, relative(1e-6));
+        assert_eq!(count(&stranger, &ours, &choice), 1);
+        stranger.tolerances.insert(ProcedureId::DirectIlluminance, relative(9.0));
+        assert_eq!(count(&stranger, &ours, &choice), 2);
+    }
+
+    #[test]
+    fn no_more_than_twenty_things_that_were_overruled_are_reported_and_each_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut cases = vec![];
+        for k in 0..21 {
+            let inner = folder.path().join(format!("{k}"));
+            std::fs::create_dir(&inner).unwrap();
+            std::fs::write(inner.join(POLICY_FILE), "").unwrap();
+            cases.extend(["a.yaml", "b.yaml"].map(|name| case_in(&inner, name, Trust::Stranger)));
+        }
+        let ours = Arc::new(Policy::built_in().unwrap());
+        let policies = vec![ours; cases.len()];
+        for (asked, reported) in [(2, 1), (38, 19), (40, 20), (42, 20)] {
+            let found = overruled(&cases[..asked], &policies[..asked], &PolicyChoice::default());
+            assert_eq!(found.len(), reported, "{asked}");
+        }
+    }
 }
