@@ -39,9 +39,9 @@ struct Row {
     unit: f64,
 }
 
-/// The rows of a file in `reference/analytic/values`, which writes one a line.
-fn rows(name: &str) -> Vec<Row> {
-    let text = std::fs::read_to_string(reference("analytic/values").join(name)).unwrap();
+/// The rows of a file of values below `reference`, which writes one a line.
+fn rows(path: &str) -> Vec<Row> {
+    let text = std::fs::read_to_string(reference(path)).unwrap();
     let mut procedure = String::new();
     let mut rows = vec![];
     for line in text.lines() {
@@ -66,12 +66,15 @@ fn vector(text: &str) -> DVec3 {
 }
 
 /// Compares every row of a table with a second derivation, to one unit of its last digit.
-fn check(name: &str, count: usize, derive: impl Fn(&Meter) -> f64) {
-    let rows = rows(name);
-    assert_eq!(rows.len(), count, "{name}");
+fn check(path: &str, count: usize, derive: impl Fn(&Meter) -> f64) {
+    check_rows(path, &rows(path), count, derive);
+}
+
+fn check_rows(path: &str, rows: &[Row], count: usize, derive: impl Fn(&Meter) -> f64) {
+    assert_eq!(rows.len(), count, "{path}");
     for row in rows {
         let derived = derive(&row.meter);
-        assert!((derived - row.value).abs() <= row.unit, "{name} {:?}: {derived} against {}", row.meter, row.value);
+        assert!((derived - row.value).abs() <= row.unit, "{path} {:?}: {derived} against {}", row.meter, row.value);
     }
 }
 
@@ -81,24 +84,34 @@ fn square(centre: DVec3, u: DVec3, v: DVec3) -> [DVec3; 4] {
 
 #[test]
 fn point_and_area_sources_follow_lambert() {
-    check("cie-5.2.yaml", 10, |meter| {
+    check("cie171/values/5.2.yaml", 10, |meter| {
         let offset = meter.position_m - DVec3::new(4.0, 4.0, 3.5);
         closed_form::lambertian_point(Candela(1000.0), -offset.z, offset.x.hypot(offset.y)).value()
     });
     let source = square(DVec3::new(4.0, 4.0, 3.5), DVec3::X * 0.5, DVec3::Y * 0.5);
     let exitance = closed_form::lambertian_exitance(1000.0).value();
-    check("cie-5.3.yaml", 10, |meter| exitance * element_to_polygon(meter.position_m, meter.normal, &source));
+    check("cie171/values/5.3.yaml", 10, |meter| exitance * element_to_polygon(meter.position_m, meter.normal, &source));
 }
 
 #[test]
 fn an_evenly_lit_disc_reflects_by_its_closed_factors() {
-    check("cie-5.6.yaml", 10, |meter| {
+    let path = "cie171/values/5.6.yaml";
+    let (direct, indirect): (Vec<Row>, Vec<Row>) = rows(path).into_iter().partition(|row| row.procedure == "direct");
+    check_rows(path, &indirect, 10, |meter| {
         let offset = (meter.position_m.x - 2.0).hypot(meter.position_m.y - 2.0);
         let height = meter.position_m.z;
         let horizontal = meter.normal == DVec3::NEG_Z;
         let factor = if horizontal { closed_form::disc_parallel } else { closed_form::disc_perpendicular };
         800.0 * factor(1.5, height, offset)
     });
+    // The direct light is even: 1000 lx on the floor, 2.5 m below the spot, and by the square of the distance elsewhere.
+    check_rows(path, &direct, 4, |meter| 1000.0 * 6.25 / (2.5 - meter.position_m.z).powi(2));
+    // So the spot's own file sends it.
+    let scene = scene(DVec3::new(4.0, 4.0, 3.0), 0.0, "even-spot-15dm.ies", DVec3::new(2.0, 2.0, 2.5));
+    for row in direct {
+        let read = inverse_square::direct_illuminance(&scene, &row.meter).unwrap().illuminance.value();
+        assert!((read / row.value - 1.0).abs() < 5e-4, "{:?}: {read} against {}", row.meter, row.value);
+    }
 }
 
 #[test]
@@ -111,11 +124,13 @@ fn a_screen_leaves_the_contour_integral_of_what_shows() {
             800.0 * closed_form::disc_segment(1.0, beyond + shift - 1.2, element, meter.normal)
         }
     };
-    check("cie-5.7.yaml", 14, at_edge(0.0));
+    check("cie171/values/5.7.yaml", 14, at_edge(0.0));
     // Without the screen, or with its lower edge seen 1 cm elsewhere, the table does not fit.
     for shift in [f64::NEG_INFINITY, 0.01] {
-        let misses =
-            rows("cie-5.7.yaml").iter().filter(|r| (at_edge(shift)(&r.meter) - r.value).abs() > r.unit).count();
+        let misses = rows("cie171/values/5.7.yaml")
+            .iter()
+            .filter(|r| (at_edge(shift)(&r.meter) - r.value).abs() > r.unit)
+            .count();
         assert!(misses >= 5, "{shift}: {misses}");
     }
 }
@@ -124,7 +139,7 @@ fn a_screen_leaves_the_contour_integral_of_what_shows() {
 fn within_a_closed_cube_of_panels_every_meter_reads_their_exitance() {
     let exitance = closed_form::lambertian_exitance(1000.0 / 4.0).value();
     let axes = [(DVec3::X, DVec3::Y), (DVec3::Y, DVec3::Z), (DVec3::Z, DVec3::X)];
-    check("furnace.yaml", 16, |meter| {
+    check("analytic/values/furnace.yaml", 16, |meter| {
         let sides = axes.iter().flat_map(|&(u, v)| {
             let out = u.cross(v);
             [out, -out].map(|out| square(DVec3::splat(2.0) + out, u, v))
@@ -137,7 +152,7 @@ fn within_a_closed_cube_of_panels_every_meter_reads_their_exitance() {
 fn a_body_in_a_furnace_is_as_bright_all_over_as_it_reflects() {
     let exitance = closed_form::lambertian_exitance(1000.0 / 4.0).value();
     let axes = [(DVec3::X, DVec3::Y), (DVec3::Y, DVec3::Z), (DVec3::Z, DVec3::X)];
-    check("lit-body.yaml", 7, |meter| {
+    check("analytic/values/lit-body.yaml", 7, |meter| {
         let sides = axes.iter().flat_map(|&(u, v)| {
             let out = u.cross(v);
             [out, -out].map(|out| square(DVec3::splat(2.0) + out, u, v))
@@ -154,7 +169,7 @@ fn an_opening_before_an_evenly_lit_disc_glares_by_the_formula() {
         ..scene(DVec3::ONE, 0.0, "glare-10cm.ies", DVec3::new(0.9, 2.0, 2.15)).luminaires.remove(0)
     };
     let scene = Scene { luminaires: vec![glare], ..Scene::default() };
-    check("glare.yaml", 2, |eye| {
+    check("analytic/values/glare.yaml", 2, |eye| {
         let background = 800.0 * closed_form::disc_perpendicular(1.5, eye.position_m.z, eye.position_m.x - 2.0);
         observer::rating(observer::Glare::seen(&scene, eye).unwrap().sum, Lux(background))
     });
@@ -169,7 +184,7 @@ fn a_lambertian_panel_has_one_luminance_from_wherever_it_is_seen() {
     };
     // What it gives an eye, by its corners, over the solid angle that it fills there.
     let side = square(DVec3::ZERO, 0.3 * DVec3::X, 0.3 * DVec3::Y).map(|p| panel.position_m + panel.orientation * p);
-    check("opening.yaml", 4, |eye| {
+    check("analytic/values/opening.yaml", 4, |eye| {
         let exitance = closed_form::lambertian_exitance(1000.0 / 0.36).value();
         let lux = exitance * element_to_polygon(eye.position_m, eye.normal, &side);
         lux / Sight::of(&panel, eye).unwrap().projected_sr
@@ -233,13 +248,15 @@ const GAUSS: [(f64, f64); 4] = [
 fn an_isotropic_point_follows_the_inverse_square_law() {
     // Independently of the table's square and cosine: from the luminaire's own file, by the calculator.
     let scene = scene(DVec3::new(5.0, 5.0, 4.0), 0.0, "isotropic.ies", DVec3::new(2.5, 2.5, 2.0));
-    check("cie-5.4.yaml", 96, |meter| inverse_square::direct_illuminance(&scene, meter).unwrap().illuminance.value());
+    check("cie171/values/5.4.yaml", 96, |meter| {
+        inverse_square::direct_illuminance(&scene, meter).unwrap().illuminance.value()
+    });
 }
 
 #[test]
 fn a_box_collects_the_flux_that_is_emitted_in_it() {
-    // The meters of cie-5.4.yaml, read from the file: 16 a set, six sets in the file's order.
-    let text = std::fs::read_to_string(reference("analytic/cie-5.4.yaml")).unwrap();
+    // The meters of 5.4-flux.yaml, read from the file: 16 a set, six sets in the file's order.
+    let text = std::fs::read_to_string(reference("cie171/5.4-flux.yaml")).unwrap();
     let scene = scene(DVec3::new(5.0, 5.0, 4.0), 0.0, "isotropic.ies", DVec3::new(2.5, 2.5, 2.0));
     let mut normal = DVec3::ZERO;
     let (mut collected, mut count) = (0.0, 0);
@@ -322,7 +339,7 @@ fn doubt(uncertainty: Uncertainty) -> f64 {
 fn case_s1_agrees_with_the_calculators_and_the_simulator() {
     let mut scene = scene(DVec3::splat(20.0), 0.5, "axial.ies", DVec3::splat(10.0));
     scene.room = Some(Room { size_m: DVec3::splat(20.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) });
-    let rows = rows("s1.yaml");
+    let rows = rows("analytic/values/s1.yaml");
     let (direct, indirect): (Vec<Row>, Vec<Row>) = rows.into_iter().partition(|row| row.procedure == "direct");
     assert_eq!((direct.len(), indirect.len()), (4, 4));
     for row in direct {

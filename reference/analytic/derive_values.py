@@ -1,8 +1,8 @@
 """Writes values/*.yaml: what the analytic cases must read, by area quadrature of Lambert's law.
 
 It is one of two derivations: tests/analytic_values.rs derives every value again, from closed forms and contour
-integrals of luminaire::calculators and luminaire::geometry, and compares. Case 5.7 of CIE 171:2006 is not taken
-from its Table 19, which holds errors. Case 5.8 has a law (the mean of a closed room) and no values here.
+integrals of luminaire::calculators and luminaire::geometry, and compares. ../cie171/derive_lamps.py writes those of
+CIE 171:2006 by the same functions.
 
 Only Python's standard library is needed:  python3 derive_values.py   (in this folder)
 """
@@ -13,46 +13,13 @@ FORMAT = "# Format: see reference/published/cachet.yaml; `basis` says that these
 
 def main():
     up, down = (0, 0, 1), (0, 0, -1)
-    offsets = [(0, 0), (.5, 0), (1, 0), (1.5, 0), (.5, .5), (1, .5), (1.5, .5), (1, 1), (1.5, 1), (1.5, 1.5)]
-    rows = []
-    for x, y in offsets:
-        d2 = x * x + y * y + 9
-        candela, cosine = 1000 * 3 / math.sqrt(d2), 3 / math.sqrt(d2)
-        rows.append(((4 + x, 4 + y, .5), up, candela * cosine / d2))
-    write("cie-5.2", "CIE 171:2006-type case 5.2", "closed_form", 3, {"direct_illuminance": ("point", rows)})
-
-    source = rectangle((3.5, 4.5), (3.5, 4.5), 3.5)
-    rows = [((4, 2, z + .5), (0, 1, 0)) for z in (2.75, 2.25, 1.75, 1.25, .75, .25)]
-    rows += [((4, 2 + y, .5), up) for y in (.25, .75, 1.25, 1.75)]
-    rows = [(p, n, 1000 * math.pi * factor(p, n, source)) for p, n in rows]
-    write("cie-5.3", "CIE 171:2006-type case 5.3", "closed_form", 3, {"direct_illuminance": ("area", rows)})
-
-    # The meters of the spec: products of four Gauss-Legendre nodes on a quarter of each side.
-    x, z = ([round(.5 + half * u, 9) for u, _ in sorted(gauss(4))] for half in (2, 1.5))
-    rows = [((a, b, .5), up) for a in x for b in x] + [((a, b, 3.5), down) for a in x for b in x]
-    rows += [((w, a, b), (n, 0, 0)) for w, n in ((.5, 1), (4.5, -1)) for a in x for b in z]
-    rows += [((a, w, b), (0, n, 0)) for w, n in ((.5, 1), (4.5, -1)) for a in x for b in z]
-    rows = [(p, n, isotropic(10_000, (2.5, 2.5, 2.0), p, n)) for p, n in rows]
-    write("cie-5.4", "CIE 171:2006-type case 5.4", "closed_form", 3, {"direct_illuminance": ("point", rows)})
-
-    disc = segment((2, 2), 1.5, -math.inf)
-    rows = [((2 + x, 2, 2.9), down) for x in (.25, .75, 1.25, 1.75)]
-    rows += [((3.9, 2, z), (-1, 0, 0)) for z in (.25, .75, 1.25, 1.75, 2.25, 2.75)]
-    rows = [(p, n, 800 * factor(p, n, disc)) for p, n in rows]
-    write("cie-5.6", "CIE 171:2006-type case 5.6", "closed_form", 3, {"indirect_illuminance": ("point", rows)})
-
-    places = [((3.9, y, z), (-1, 0, 0)) for y in (2, 3) for z in (.5, 1.5, 2, 2.5, 2.9)]
-    places += [((x, 2, 2.9), down) for x in (2.6, 3.0, 3.4, 3.8)]
-    rows = [(p, n, 800 * factor(p, n, segment((1.2, 2), 1, shadow_edge(p)))) for p, n in places]
-    write("cie-5.7", "CIE 171:2006-type case 5.7", "closed_form", 3, {"indirect_illuminance": ("point", rows)})
-
     places = [(p, n) for n in (up, down, (1, 0, 0), (.36, -.48, .8))
               for p in ((2, 2, 2), (1.6, 2.3, 2.45), (1.55, 1.6, 1.55), (2.4, 1.7, 2.1))]
     rows = [(p, n, 250 * math.pi) for p, n in places]
     write("furnace", "Furnace of luminous panels", "closed_form", 3, {"direct_illuminance": ("area", rows)})
 
     # An opening of .01 m2 and 200 cd, its face upright, .3 and .5 times as high above the line of sight as it is far along it: 1.90 and
-    # 2.86 are entries of CIE 117's table 4.1. The background is the lit disc of case 5.6.
+    # 2.86 are entries of CIE 117's table 4.1. The background is the lit disc of case 5.6 of CIE 171:2006.
     disc, rows = segment((2, 2), 1.5, -math.inf), []
     for z, index in ((1.25, 1.9), (.65, 2.86)):
         eye, source = (3.9, 2, z), (.9, 2, 2.15)
@@ -110,11 +77,6 @@ def gauss(n):
 NODES = gauss(60)
 
 
-def rectangle(xs, ys, z):
-    return [((xs[0] + u * (xs[1] - xs[0]), ys[0] + v * (ys[1] - ys[0]), z), a * b * (xs[1] - xs[0]) * (ys[1] - ys[0]))
-            for u, a in NODES for v, b in NODES]
-
-
 def segment(centre, radius, beyond):
     """Points and areas of the part x > beyond of a disc on the floor; x = r cos t takes the square root away."""
     edge = max(-radius, beyond - centre[0])
@@ -130,12 +92,6 @@ def segment(centre, radius, beyond):
     return out
 
 
-def shadow_edge(point):
-    """Where the line from a point through the screen's nearer lower edge (x 2.41, z 1) meets the floor."""
-    x, _, z = point
-    return x - (x - 2.41) * z / (z - 1) if z > 1 else -math.inf
-
-
 def factor(point, normal, patches):
     """Configuration factor by summing cos cos / (pi d^2) over horizontal patches."""
     total = 0.0
@@ -144,13 +100,6 @@ def factor(point, normal, patches):
         d2 = sum(r * r for r in ray)
         total += max(0.0, sum(r * n for r, n in zip(ray, normal))) * abs(ray[2]) / (math.pi * d2 * d2) * area
     return total
-
-
-def isotropic(flux_lm, lamp, place, normal):
-    """Inverse-square law of a point that sends the same intensity everywhere."""
-    ray = [a - b for a, b in zip(lamp, place)]
-    distance = math.hypot(*ray)
-    return flux_lm / (4 * math.pi) * sum(a * b for a, b in zip(ray, normal)) / distance ** 3
 
 
 LUMINANCE = "luminance_cd_m2"

@@ -1,10 +1,11 @@
-"""Writes values/*.yaml: the illuminance at every point of cases 5.9 to 5.14 of CIE 171:2006 under the 16 skies of CIE S 011.
+"""Writes values/5.9.yaml to 5.14.yaml: every point of these cases of CIE 171:2006 under the 16 skies of CIE S 011.
 
 The luminance of sky and ground is integrated over the area of the opening that shows, by Gauss's rule on triangles. It
 is one of two derivations: tests/analytic_values/cie171.rs integrates over the solid angle of the sky and shares no code.
 Both agree to 1e-6 of every value. No value is taken from the standard.
 
-Only Python's standard library is needed:  python3 derive.py   (in this folder; some minutes)
+Only Python's standard library is needed:  python3 derive.py   (in this folder; some minutes). With `aside` as its
+argument it writes the values of the cases aside and far alone, in seconds.
 """
 import math
 import sys
@@ -12,7 +13,8 @@ import sys
 sys.path.insert(0, "../analytic")
 
 from derive_values import gauss
-from geometry import MASK, OVERHANG, SUN_ZENITH_DEG, VARIANTS, case_of, has_glass, points
+from geometry import (ASIDE, FAR, MASK, OVERHANG, SUN_ZENITH_DEG, VARIANTS, aside_points, case_of, far_points, has_glass,
+                      middle_z, points)
 from skies import GRADATIONS, GROUND_CD_M2, INDICATRICES, PAIRS, Sky, glass
 
 NODES = gauss(40)
@@ -20,34 +22,70 @@ KINDS = range(1, 17)
 
 
 def main():
+    for variant in ASIDE:
+        aside(variant)
+    for variant in FAR:
+        far(variant)
+    if sys.argv[1:] == ["aside"]:
+        return
     tables = {}
     for variant, (kind, across, along) in VARIANTS.items():
         sun = Sky(5, 90 if kind == "roof" else 0, SUN_ZENITH_DEG).sun
         scales = [Sky(k, 0, SUN_ZENITH_DEG).scale for k in KINDS]
         rows = tables.setdefault(case_of(variant), {})
         for letter, (place, normal) in points(kind).items():
-            corners = outline(kind, across, along, place)
-            sums = [0.0] * 17
-            # Each half lies above the horizon or below it.
-            for part in halves(corners, 2, place[2]):
-                above = sum(corner[2] - place[2] for corner in part) > 0
-                add(sums, part, above, place, normal, 2 if kind == "roof" else 0, sun, has_glass(variant))
-            # The last sum is that of the ground, whose luminance is the same under every sky.
+            sums = light_that_shows(outline(kind, across, along, place), place, normal, kind, sun, has_glass(variant))
             cells = rows.setdefault(letter, (place, normal, {}))[2]
             size = variant[len(case_of(variant)) + 1:]
             for k, scale in zip(KINDS, scales):
                 cells[f"{size}-sky-{k}"] = scale * sums[k - 1] + sums[16]
     for case, rows in tables.items():
-        write(case, rows)
+        write(case, rows, "Written by derive.py. A column is a case of the spec.")
 
 
-def outline(kind, across, along, place):
+def aside(variant):
+    """Writes the values of a case aside, which has one sky."""
+    kind, across, along, number, azimuth = ASIDE[variant]
+    sky, rows = Sky(number, azimuth, SUN_ZENITH_DEG), {}
+    for k, (place, normal) in enumerate(aside_points(kind)):
+        corners = outline(kind, across, along, place, azimuth if kind == "roof" else 0)
+        sums = light_that_shows(corners, place, normal, kind, sky.sun, has_glass(variant))
+        rows[k] = place, normal, {"value": sky.scale * sums[number - 1] + sums[16]}
+    write(variant, rows, "Written by derive.py.")
+
+
+def far(variant):
+    """Writes the values of a case far; its skies have no sun."""
+    kind, across, along, numbers = FAR[variant]
+    skies, rows = [Sky(number, 0, SUN_ZENITH_DEG) for number in numbers], {}
+    for k, (place, normal) in enumerate(far_points(kind)):
+        sums = light_that_shows(outline(kind, across, along, place), place, normal, kind, skies[0].sun, has_glass(variant))
+        values = {f"sky-{sky.kind}": sky.scale * sums[sky.kind - 1] + sums[16] for sky in skies}
+        rows[k] = place, normal, values if len(skies) > 1 else {"value": next(iter(values.values()))}
+    write(variant, rows, "Written by derive.py.")
+
+
+def light_that_shows(corners, place, normal, kind, sun, is_glazed):
+    """The illuminance by what shows: of the 16 skies, unscaled, and of the ground, which is the same under every sky."""
+    sums = [0.0] * 17
+    # Each half lies above the horizon or below it.
+    for part in halves(corners, 2, place[2]):
+        above = sum(corner[2] - place[2] for corner in part) > 0
+        add(sums, part, above, place, normal, 2 if kind == "roof" else 0, sun, is_glazed)
+    return sums
+
+
+def outline(kind, across, along, place, turn_deg=0):
     """The corners of the part of the opening, or of the plane of a mask's edge, that shows; in order."""
     if kind == "roof":
-        return [(4 + s * across / 2, 4 + t * along / 2, 3.5) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        turn = math.radians(turn_deg)
+        corners = [(s * across / 2, t * along / 2) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        return [(4 + u * math.cos(turn) - v * math.sin(turn), 4 + u * math.sin(turn) + v * math.cos(turn), 3.5)
+                for u, v in corners]
     if kind == "facade":
         return upright(8, (4 - across / 2, 4 + across / 2), (2 - along / 2, 2 + along / 2))
-    x, y, z = OVERHANG if kind == "overhang" else MASK
+    x, y, _ = OVERHANG if kind == "overhang" else MASK
+    z = middle_z(kind, along)
     sill = 6.5 if kind == "overhang" else 2.5
     ends = [[y - across / 2, y + across / 2], [z - along / 2, z + along / 2]]
     for face in (6, 6.2):       # both faces of the wall around the opening of 2 x 1 m
@@ -152,20 +190,23 @@ def luminances(towards, sun):
     return [gradations[g] * indicatrices[i] for g, i in PAIRS] + [(1 + 2 * max(rise, 0.0)) / 3]
 
 
-def write(case, rows):
+def write(case, rows, comment):
     lines = ["# Format: see reference/published/cachet.yaml; `basis` says that these are no readings but derived values.",
-             "# Written by derive.py. A column is a case of the spec.",
+             f"# {comment}",
              "luxproof_published: 1", "citation:", f'  title: "CIE 171:2006, case {case}"', "  basis: closed_form",
              "rounding: {units_in_last_digit: 1}", "tables:", "  direct_illuminance:", f'    name: "{case}"',
              "    quantity: illuminance_lx", "    columns:"]
-    for name in rows["A"][2]:
-        lines.append(f'      {name}: {{reference: true, engine: closed_form, model: area, case: {name}, '
+    for name in next(iter(rows.values()))[2]:
+        of_case = "" if name == "value" else f" case: {name},"
+        lines.append(f'      {name}: {{reference: true, engine: closed_form, model: area,{of_case} '
                      f'meaning: "Derived, no program\'s output"}}')
     lines.append("    rows:")
     for letter, (place, normal, cells) in rows.items():
         at, facing = (f"[{', '.join(f'{v:.9g}' for v in vector)}]" for vector in (place, normal))
         printed = ", ".join(f'{name}: "{digits(value)}"' for name, value in cells.items())
-        lines += [f"      # {letter}", f"      - {{at_m: {at}, normal: {facing}, cells: {{{printed}}}}}"]
+        if isinstance(letter, str):
+            lines.append(f"      # {letter}")
+        lines.append(f"      - {{at_m: {at}, normal: {facing}, cells: {{{printed}}}}}")
     with open(f"values/{case}.yaml", "w", encoding="ascii") as file:
         file.write("\n".join(lines) + "\n")
 

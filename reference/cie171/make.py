@@ -1,8 +1,15 @@
 """Writes luminaires/*.ies and the specs of cases 5.9 to 5.14: openings under the 16 skies of CIE S 011, as luminaires.
 
-See ../analytic/make_openings.py for why an opening is a luminaire. The sun stands over the plane C 0 - C 180, so that
-half the planes suffice. Angles are close together about the sun, at grazing incidence and at the horizon. Files of one
-sky differ in their header alone: the second number of its ninth line multiplies the table by the area of the opening.
+The light of a sky at infinity depends on direction alone and is the same at every point of an opening of no thickness.
+Such an opening of area A is a luminaire flush with the room's surface, exactly: I(w) = L(-w) A cos(theta), w the
+direction in which light travels, theta its angle with the opening's normal; behind clear glass, times the share that
+the glass lets through at theta.
+
+A roof looks down. A facade on the side x+ of a room is turned by `tilt: 90`: its nadir points inwards and its C 0 down.
+Light of the sky travels within 90 degrees of C 0, light of the ground beyond, and planes a thousandth of a degree apart
+hold the jump at the horizon. Where the sun stands over the plane C 0 - C 180, half the planes suffice. Angles are close
+together about the sun, at grazing incidence and at the horizon. Files of one sky differ in their header alone: the
+second number of its ninth line multiplies the table by the area of the opening.
 
 Only Python's standard library is needed:  python3 make.py   (in this folder)
 """
@@ -11,25 +18,52 @@ import sys
 
 sys.path.insert(0, "../analytic")
 
-from geometry import SUN_ZENITH_DEG, VARIANTS, case_of, has_glass, points
-from make_openings import Opening, wrap
+from geometry import ASIDE, SUN_ZENITH_DEG, VARIANTS, case_of, has_glass, points
 from skies import TYPES, Sky, glass, unglazed
 
 KINDS = range(1, 17)
 
 
-class StandardOpening(Opening):
-    """An opening of 1 m2 at the origin of its table; `write` gives it its size."""
+class Opening:
+    """An opening of 1 m2 under a sky; `write` gives it its size."""
+
+    def __init__(self, is_upright, sky, pane):
+        self.is_upright, self.sky, self.pane = is_upright, sky, pane
+
+    def seen(self, c_deg, gamma_deg):
+        """Towards where light comes from that travels in a direction of the table, and the cosine of its incidence."""
+        c, gamma = math.radians(c_deg), math.radians(gamma_deg)
+        x, y, z = -math.sin(gamma) * math.cos(c), -math.sin(gamma) * math.sin(c), math.cos(gamma)
+        if gamma_deg == 90:
+            z = 0.0
+        if not self.is_upright:
+            return (x, y, z), z
+        rise = 0.0 if c_deg in (90, 270) else -x
+        if gamma_deg == 0:              # straight in from the horizon, above it or below it by the plane's side
+            rise = 0.0 if c_deg <= 90 or c_deg >= 270 else -1e-9
+        return (z, y, rise), z
+
+    def intensity(self, c_deg, gamma_deg):
+        towards, cosine = self.seen(c_deg, gamma_deg)
+        if cosine == 0:
+            return 0.0
+        return self.sky.luminance(towards) * cosine * self.pane(cosine)
 
     def angles(self):
         # The transmittance of glass falls fast at grazing incidence.
         grazing = .5 if self.pane is glass else 1
         has_sun = self.sky.kind < 16 and TYPES[self.sky.kind][2] != 0
-        if not self.facade:
+        if not self.is_upright:
             if not has_sun:
                 return [0], steps((0, 76, 1), (76, 90, .5))
             # Light that comes from the sun travels towards C 180.
             return steps((0, 150, 5), (150, 180, 2.5)), steps((0, 20, 2), (20, 40, 1), (40, 76, 2), (76, 90, grazing))
+        x, y, z = self.sky.sun
+        if has_sun and abs(y) > 1e-9:
+            # The plane and the angle that the sun lies in are among them.
+            c, gamma = math.degrees(math.atan2(-y, z)) % 360, math.degrees(math.acos(x))
+            planes = steps((0, 360, 2.5)) + [90.001, 269.999, round(c, 6)]
+            return sorted(planes), sorted(steps((0, 76, 1), (76, 90, grazing)) + [round(gamma, 6)])
         planes = steps((0, 30, 2.5), (30, 80, 5), (80, 90, 2.5)) + [90.001, 180]
         return planes, steps((0, 50, 2), (50, 76, 1), (76, 90, grazing))
 
@@ -45,6 +79,10 @@ class StandardOpening(Opening):
             file.write("\r\n".join(lines) + "\r\n")
 
 
+def wrap(words, per_line=16):
+    return [" ".join(words[k:k + per_line]) for k in range(0, len(words), per_line)]
+
+
 def steps(*ranges):
     """Angles from the first to the last of some ranges, each with its step."""
     angles = [ranges[0][0]]
@@ -58,11 +96,16 @@ def main():
         for pane in (unglazed, glass):
             for kind in KINDS:
                 # Of a roof it stands in the plane that the table begins with; the spec turns it before the wall.
-                opening = StandardOpening("", is_upright, 1, 1, Sky(kind, 0, SUN_ZENITH_DEG), pane)
+                opening = Opening(is_upright, Sky(kind, 0, SUN_ZENITH_DEG), pane)
                 for variant, (shape, across, along) in VARIANTS.items():
                     if (shape != "roof") == is_upright and has_glass(variant) == (pane is glass):
                         name = f"{variant}-sky-{kind}"
                         opening.write(name, across, along, f"Opening {across} x {along} m of case {case_of(variant)}, sky {kind}")
+    for name, (shape, across, along, kind, azimuth) in ASIDE.items():
+        # That of a roof is the opening above; its spec turns it.
+        if shape != "roof":
+            opening = Opening(True, Sky(kind, azimuth, SUN_ZENITH_DEG), glass if has_glass(name) else unglazed)
+            opening.write(name, across, along, f"Opening {across} x {along} m of case {name}, sky {kind}")
     for name, (variants, head, title) in SPECS.items():
         spec(name, variants, head, title)
 

@@ -135,8 +135,8 @@ fn every_command_of_the_guide_runs() {
     assert!(count >= 20, "only {count} commands were found");
     // What the pages say is there, is there.
     for file in [
-        "cie-5.2/report.html",
-        "cie-5.3/junit.xml",
+        "5.2-point/report.html",
+        "5.3-area/junit.xml",
         "spec.schema.json",
         "mine-site/index.html",
         "shared.zip",

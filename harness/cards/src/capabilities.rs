@@ -62,7 +62,7 @@ pub struct NotShown {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaseSelector {
-    /// The name of the case, as `cie-5.8/rho-90`; `calibration` for the scenes of known answer.
+    /// The name of the case, as `5.8-interreflection/rho-90`; `calibration` for the scenes of known answer.
     pub case: String,
     pub procedures: Vec<ProcedureId>,
 }
@@ -223,7 +223,7 @@ capabilities:
     fn the_built_in_capabilities_are_sound_and_name_cases_of_the_repository() {
         let built_in = Capabilities::built_in().unwrap();
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reference");
-        let specs = ["analytic", "readers", "specs"].map(|folder| root.join(folder));
+        let specs = ["analytic", "cie171", "readers", "specs"].map(|folder| root.join(folder));
         let cases = luxproof_spec::suite(&specs, Trust::Own).unwrap();
         for selector in built_in.capabilities.iter().flat_map(|c| &c.cases).filter(|s| s.case != "calibration") {
             let case = cases.iter().find(|case| case.name == selector.case);

@@ -108,7 +108,7 @@ impl Place {
     }
 }
 
-/// `floor[1] of cie-5.2 (hidden, seed 7)`.
+/// `floor[1] of 5.2-point (hidden, seed 7)`.
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(meter) = &self.meter {

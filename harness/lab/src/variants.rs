@@ -362,7 +362,8 @@ mod tests {
 
     #[test]
     fn every_public_case_has_a_valid_variant_with_another_room_other_points_and_other_candela() {
-        for spec in ["analytic", "readers"] {
+        let of_cie171 = ["cie171/5.[2-8]*.yaml", "cie171/*-aside.yaml", "cie171/*-far.yaml"];
+        for spec in ["analytic", "readers"].into_iter().chain(of_cie171) {
             let public = suite(&[reference(spec)], Trust::Own).unwrap();
             let (_folder, hidden) = drawn(spec, 7);
             assert_eq!(hidden.len(), public.len());
@@ -385,7 +386,7 @@ mod tests {
 
     #[test]
     fn one_seed_gives_the_same_bytes_and_another_seed_others() {
-        let [a, b, c] = [7, 7, 8].map(|seed| drawn("analytic/cie-5.2.yaml", seed).0);
+        let [a, b, c] = [7, 7, 8].map(|seed| drawn("cie171/5.2-point.yaml", seed).0);
         assert_eq!(texts(a.path()), texts(b.path()));
         assert_ne!(texts(a.path())[0].1, texts(c.path())[0].1);
     }

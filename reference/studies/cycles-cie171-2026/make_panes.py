@@ -9,12 +9,12 @@ import os
 
 from make_study import HERE, all_reflections, single_pass
 
-from make import StandardOpening, steps
+from make import Opening, steps
 from skies import Sky
 from geometry import SUN_ZENITH_DEG
 
 
-class Pane(StandardOpening):
+class Pane(Opening):
     def angles(self):
         return [0], steps((0, 60, 1), (60, 90, .25))
 
@@ -23,7 +23,7 @@ def main():
     os.makedirs(os.path.join(HERE, "luminaires"), exist_ok=True)
     os.chdir(HERE)
     for name, law in (("all", all_reflections), ("single", single_pass)):
-        pane = Pane("", False, 1, 1, Sky(1, 0, SUN_ZENITH_DEG), law)
+        pane = Pane(False, Sky(1, 0, SUN_ZENITH_DEG), law)
         for side in (1, 4):
             pane.write(f"pane-{side}m-{name}", side, side, f"Opening {side} x {side} m behind a pane: {name}")
 

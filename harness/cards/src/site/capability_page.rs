@@ -54,8 +54,8 @@ const WORDS: [(&str, &str); 12] = [
         "a closed room of even light, so that every point has the same known light. Lost or added light shows at once.",
     ),
     (
-        "cie-5.2 to cie-5.14",
-        "test cases of CIE 171:2006, by the number of their section. A part such as clear-1m names the sky and the size of the opening.",
+        "5.2 to 5.14",
+        "test cases of CIE 171:2006, by the number of their section. A part such as 1m-sky-16 names the size of the opening and the sky.",
     ),
     ("rho-10, rho-50, rho-90", "all surfaces of the room reflect 10, 50 or 90 % of the light."),
     ("s1, s2", "s1 is a luminaire that shines up in a 20 m cube; s2 is an office with furniture."),

@@ -522,8 +522,8 @@ mod tests {
 
     #[test]
     fn derived_values_say_what_they_rest_on() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reference/analytic/values");
-        for (name, basis) in [("cie-5.6", Basis::ClosedForm), ("s2", Basis::Simulator)] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reference");
+        for (name, basis) in [("cie171/values/5.6", Basis::ClosedForm), ("analytic/values/s2", Basis::Simulator)] {
             let published = Published::read(&folder.join(format!("{name}.yaml"))).unwrap();
             assert_eq!(published.citation.basis, basis, "{name}");
         }

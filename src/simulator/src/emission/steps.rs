@@ -1,6 +1,6 @@
 //! Steps of a table: cells so narrow and steep that the nodes of a rule do not tell them from a jump.
 //!
-//! The horizon between sky and ground is one (`reference/analytic`): two planes a thousandth of a degree apart.
+//! The horizon between sky and ground is one (`reference/cie171`): two planes a thousandth of a degree apart.
 
 use luxproof_photometry::LuminousIntensityDistribution;
 
