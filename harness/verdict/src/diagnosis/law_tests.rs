@@ -10,6 +10,7 @@ use luxproof_spec::procedures::{Target, Task};
 use super::fault::Fault;
 use super::faulty_task::{Fidelity, Model};
 use super::glare::explain_ratings;
+use super::implementation_faults::implementation_faults;
 use super::laws::law_kinds;
 use super::lookups::lookup_kinds;
 use super::truth;
@@ -108,6 +109,18 @@ fn light_is_cut_off_between_distances_that_differ_by_a_millimetre_at_four_hundre
 }
 
 #[test]
+fn one_luminaire_of_several_gives_another_flux() {
+    let mut task = two_meters(Luminaire { flux_scale: 3.0, ..lamp() });
+    task.scene.luminaires.push(Luminaire { id: "other".into(), ..lamp() });
+    let model = Model::new(0, &task, truth(&task).unwrap());
+    let all = super::kinds(&[std::slice::from_ref(&task)]);
+    let fault = all.iter().find(|fault| fault.about == "flux of lamp").unwrap();
+    // 3 * 1.5 + 1 for 4.
+    let found = fault.readings(&model, &[1.5]).unwrap()[0] / model.right[0];
+    assert!((found - 5.5 / 4.0).abs() < 1e-9, "{found}");
+}
+
+#[test]
 fn look_ups_are_wrong_in_the_ways_they_say() {
     let all = lookup_kinds();
     // Candela at 0 and 45 degrees: 100 and 50; nodes at 0, 30 and 90 degrees of 100, 66.67 and 0.
@@ -130,6 +143,14 @@ fn look_ups_are_wrong_in_the_ways_they_say() {
         assert!(is_near, "{text}: {found:?} for {expected:?}");
     }
     assert_eq!(all.len(), 9 + 8 + 3 + 2 + 2 + 6 + 2);
+    // 45 degrees lie a quarter on the way from 66.67 to 0: .5 - .5 cos(pi/4) = .146447, and .0625 (3 - .5) = .15625.
+    let drawn = implementation_faults(&[]);
+    for (text, part) in
+        [("angles in gamma half a wave of a cosine", 0.146447), ("angles in gamma a smoothstep", 0.15625)]
+    {
+        let found = factors(&drawn, text, 0.0);
+        assert!((found[0] - 1.0).abs() < 1e-9 && (found[1] - 66.66667 * (1.0 - part) / 50.0).abs() < 2e-3, "{found:?}");
+    }
 }
 
 /// The explanation of ratings that are off by so much.

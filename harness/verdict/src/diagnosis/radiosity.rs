@@ -146,6 +146,12 @@ mod tests {
     }
 
     #[test]
+    fn the_cost_of_a_prediction_is_that_of_its_patches() {
+        // 150 patches, each with four points by luminaire, the other meters, and a fifth of all pairs.
+        assert_eq!(PatchRadiosity::count_work(2, 3), 150 * (4 * 2 + 3 + 30));
+    }
+
+    #[test]
     fn a_closed_room_has_the_reflected_light_of_its_flux() {
         // Phi = 400 pi on 24 m2: Phi rho / (A (1 - rho)) in the mean, and Phi rho / A of the first reflection alone.
         let meters = Surface::ALL.map(|surface| {

@@ -276,6 +276,14 @@ fn another_gamma_may_be_looked_up_and_lie_beyond_the_table() {
 }
 
 #[test]
+fn rounding_does_not_lead_out_of_a_table() {
+    // 85 / 1.2 * 1.2 is a bit more than 85.
+    let mut wide = axial(&[0.0, 85.0], &[100.0, 15.0]);
+    assert!(read_other_gamma(&mut wide, 1.2, 0.0, EndOfGamma::Dark));
+    assert_reads(&wide, &[(0.0, 0.0, 100.0), (0.0, 85.0 / 1.2, 15.0), (0.0, 71.0, 0.0)]);
+}
+
+#[test]
 fn a_power_of_the_cosine_may_be_a_factor() {
     let even = axial(&[0.0, 60.0, 120.0, 180.0], &[10.0; 4]);
     for (is_dark_behind, at_120) in [(false, 2.5), (true, 0.0)] {

@@ -86,6 +86,22 @@ fn each_law_changes_what_it_is_about() {
 }
 
 #[test]
+fn behind_bodies_another_law_is_known_for_one_point_alone() {
+    let mut task = open(vec![lamp("a")]);
+    task.scene.obstacles = fixtures::s2(vec![], Transport::Direct).scene.obstacles;
+    let squared = Law { cosine: 2.0, ..Law::RIGHT };
+    let solve = |luminaires: Vec<Luminaire>, law: Law| {
+        solve_direct(&Scene { luminaires, ..task.scene.clone() }, &meters(&task), law)
+    };
+    let (right, other) = (solve(vec![lamp("a")], Law::RIGHT).unwrap(), solve(vec![lamp("a")], squared).unwrap());
+    assert!(right.iter().zip(&other).all(|(right, other)| (*right == 0.0) == (*other == 0.0)), "{right:?} {other:?}");
+    assert!(solve(vec![lamp("a"), lamp("b")], Law::RIGHT).is_some());
+    assert!(solve(vec![lamp("a"), lamp("b")], squared).is_none());
+    let opening = Luminaire { model: LuminaireModel::Area, ..lamp("a") };
+    assert!(solve(vec![opening], squared).is_none());
+}
+
+#[test]
 fn of_several_luminaires_all_count_or_the_brightest_alone() {
     let double = Luminaire { flux_scale: 2.0, ..lamp("b") };
     let task = open(vec![lamp("a"), double]);

@@ -231,6 +231,26 @@ fn fits_start_where_nothing_is_wrong_or_at_the_brightest_failing_reading() {
 }
 
 #[test]
+fn a_parameter_at_the_end_of_its_range_steps_back() {
+    let sheets = [sheet(0, 0, &[2.0; 4], &[1.0; 4], true)];
+    // Below its end of 1 it dims all light; beyond it nothing changes.
+    let fault = Fault::new("x", "x", |faulty, p| {
+        faulty.factor *= p[0].min(1.0);
+        true
+    });
+    let fault = fault.with_parameters([Parameter::new("", 1.0, 0.1, (0.0, 1.0))]);
+    with_search(&[lit(Transport::Direct)], &sheets, |search| {
+        let changed = |start: f64| {
+            search.fit_cache.borrow_mut().clear();
+            search.find_changed_sheets(search.full, &fault, &[start], &[0])
+        };
+        assert_eq!(changed(1.0), [0]);
+        // A step of .1 up from .9 ends where nothing is wrong.
+        assert_eq!((changed(0.9), changed(0.95)), (vec![], vec![0]));
+    });
+}
+
+#[test]
 fn cheap_and_failing_sheets_come_first() {
     let mut sheets = [false, true, false, true].map(|fails| sheet(0, 0, &[1.0], &[1.0], fails));
     sheets[2..].iter_mut().for_each(|sheet| sheet.is_cheap = true);
