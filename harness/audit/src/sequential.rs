@@ -140,7 +140,7 @@ pub fn sample_until_decided(
         let mut left_out = 0;
         for (&k, estimate) in request.targets.iter().zip(&estimates) {
             let reading = &mut subject.readings[k];
-            let is_stopped_early = !ignores_budget && met_nothing(estimate) && reading.value != 0.0;
+            let is_stopped_early = !ignores_budget && met_nothing(estimate);
             let effective_weight = if is_stopped_early { full_weight.min(weight * done) } else { full_weight };
             if measurement.cut_to.is_some()
                 && widens(reading.uncertainty, weights[k], estimate.uncertainty, effective_weight)

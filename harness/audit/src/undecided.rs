@@ -117,7 +117,7 @@ fn describe(c: &Comparison, obstacle: Obstacle, cut: Option<&Recording>, budget:
             budget.seconds
         ),
         (Obstacle::Discretisation, _) => format!(
-            "undecided by discretisation: {engine} states an error of {} that no sample reduces; choose a finer setting",
+            "undecided by discretisation: {engine} states an error of {} that no sample reduces; choose a finer setting, if it has one",
             size(is_discretisation)
         ),
         (Obstacle::Reference, _) => format!(
