@@ -24,7 +24,8 @@ fn own(name: &str) -> PathBuf {
 
 /// Our own files and those of the corpus with this extension.
 fn all_files(extension: &str) -> Vec<PathBuf> {
-    let folders = [own("reference/luminaires"), own("fuzz/seeds/lm63"), own("fuzz/seeds/eulumdat")];
+    let folders =
+        ["reference/luminaires", "reference/cie171/luminaires", "fuzz/seeds/lm63", "fuzz/seeds/eulumdat"].map(own);
     let folders = folders.into_iter().chain(corpus());
     let found: Vec<PathBuf> = folders.flat_map(|folder| files(&folder, extension)).collect();
     // The fuzzer's seeds of types A and B are no tables of type C, into which the laws below convert.
