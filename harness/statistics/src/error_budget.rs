@@ -289,6 +289,16 @@ mod tests {
     }
 
     #[test]
+    fn the_share_of_a_stage_changes_no_degrees_of_freedom() {
+        // By hand: (3^2 + 4^2)^2 / (3^4 / 7).
+        let parts = [chance(3.0), Component::normal(Source::Reference, 4.0, None)];
+        for share in [1.0, 0.125] {
+            let found = budget_of_stage(parts.to_vec(), upper_tail_of_normal(2.0), share);
+            assert!((found.degrees_of_freedom.unwrap() - 7.0 * 625.0 / 81.0).abs() < 1e-9, "{share}: {found:?}");
+        }
+    }
+
+    #[test]
     fn a_bound_is_convolved_with_chance_at_its_own_width() {
         for (freedom, bound, expanded) in [(None, 1.0, 2.298967156), (Some(5.0), 2.0, 3.376284182)] {
             let parts =

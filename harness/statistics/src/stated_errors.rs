@@ -881,6 +881,24 @@ mod tests {
         assert!(check_claims(&[vec![Estimate::exact(10.0); 4]]).is_none());
     }
 
+    /// Readings that state an error of zero.
+    fn without_error(values: &[f64]) -> Vec<Estimate> {
+        values.iter().map(|value| Estimate { value: *value, uncertainty: Uncertainty::sampled(0.0, None) }).collect()
+    }
+
+    #[test]
+    fn readings_that_claim_no_error_have_that_of_their_scatter() {
+        // By hand: 9, 10 and 11 have the standard deviation 1, with two degrees of freedom. The fewest of all meters count.
+        let meters = [
+            (MeterId::new("m", 0), without_error(&[9.0, 10.0, 11.0])),
+            (MeterId::new("m", 1), without_error(&[10.0; 4])),
+        ];
+        let found = of_unstated(&meters).unwrap();
+        assert!((found.claim_scatter.unwrap() - 0.1).abs() < 1e-12, "{found:?}");
+        assert!((found.at[&MeterId::new("m", 0)] - 0.1).abs() < 1e-12 && found.at.len() == 1, "{found:?}");
+        assert_eq!(found.degrees_of_freedom, 2.0);
+    }
+
     /// A finding with these degrees of freedom of errors that vary.
     fn heavy_tailed(freedom: f64) -> StatedErrors {
         StatedErrors {
