@@ -78,6 +78,14 @@ mod tests {
     }
 
     #[test]
+    fn shares_and_their_interval_are_relative_to_the_renderer() {
+        // By hand: 30, 10 and 20 lx of 80 lx, and intervals of 3 and 4 lx in quadrature.
+        let split = DeviationSplit::new(Lux(110.0), within(100.0, 3.0), within(80.0, 4.0)).unwrap();
+        let expected = DeviationSplit { whole: 0.375, method: 0.125, renderer: 0.25, uncertainty: 0.0625 };
+        assert_eq!(split, expected);
+    }
+
+    #[test]
     fn what_rounds_to_nothing_has_no_sign() {
         let split = DeviationSplit::new(Lux(1.03), within(0.9999, 0.0), within(1.0, 0.0)).unwrap();
         assert_eq!(split.to_string(), "+3.0 %: +3.0 % is the method's, +0.0 % the renderer's, +-0.0 %");

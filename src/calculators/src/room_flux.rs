@@ -257,6 +257,23 @@ mod tests {
     }
 
     #[test]
+    fn what_is_let_into_a_wall_keeps_the_light_that_leaves_the_wall() {
+        // 100 cd along the axis' side and 40 cd behind it: 200 pi lm and 80 pi lm.
+        let gamma = vec![0.0, 90.0, 90.0 + 1e-9, 180.0];
+        let uneven = LuminousIntensityDistribution::axial(gamma, vec![100.0, 100.0, 40.0, 40.0]).unwrap();
+        // A tilt of 90 degrees turns the axis towards -x: away from one wall, and into the other.
+        let mut luminaire = hung(&Arc::new(Photometry::of(uneven)), orientation(0.0, 90.0, 0.0), 1.0);
+        for (x_m, expected_lm) in [(4.0, 200.0), (0.0, 80.0)] {
+            luminaire.position_m = DVec3::new(x_m, 2.0, 1.0);
+            let (room, all) = scene(vec![luminaire.clone()]);
+            assert!(flush::surface_of(&room, &all.luminaires[0]).is_some());
+            let found = RoomFluxes::default().entering(&room, &all, None).unwrap()[0];
+            let entering_lm = found.up_lm() + found.down_lm();
+            assert_relative_eq!(entering_lm, expected_lm * std::f64::consts::PI, max_relative = 1e-6);
+        }
+    }
+
+    #[test]
     fn what_is_let_into_the_ceiling_loses_its_upward_light() {
         // 100 cd downward and 40 cd upward: 200 pi lm and 80 pi lm, doubled by the flux scale.
         let gamma = vec![0.0, 90.0, 90.0 + 1e-9, 180.0];

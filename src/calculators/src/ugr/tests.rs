@@ -333,6 +333,18 @@ fn what_is_behind_below_hidden_or_edge_on_does_not_glare() {
 }
 
 #[test]
+fn an_uplight_behind_an_eye_and_below_it_does_not_glare() {
+    // Sideways and up over along are those of a place in front, since all three have the other sign.
+    let panel = panel(0.3, 0.1, |_, g| 900.0 * g.to_radians().cos());
+    for place in [[0.5, -4.0, -1.5], [0.1, -0.8, -0.3]] {
+        let mut scene = scene_of(&panel, &[place]);
+        scene.luminaires[0].orientation = orientation(0.0, 180.0, 0.0);
+        assert!(scene.luminaires[0].intensity_towards(-DVec3::from(place)).value() > 0.0);
+        assert_eq!(Glare::seen(&scene, &EYE), Err(NoGlare::NothingSeen), "{place:?}");
+    }
+}
+
+#[test]
 fn the_openings_that_count_have_their_number_and_solid_angles() {
     let panel = panel(0.3, 0.1, |_, g| 900.0 * g.to_radians().cos());
     let places = [[0.5, 4.0, 1.5], [0.0, 3.0, 1.0], [-1.0, 6.0, 2.0], [0.0, -3.0, 1.0]];
