@@ -134,6 +134,7 @@ mod tests {
     use super::*;
     use luxproof_engines::{all, fixtures};
     use luxproof_model::ProcedureId;
+    use luxproof_photometry::TypeCLimits;
     use luxproof_scene::{LuminaireModel, Transport};
 
     fn key_of(engine: &dyn Engine, job: &Job) -> Key {
@@ -166,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fingerprint_a_setting_and_the_type_of_a_table_change_the_key() {
+    fn a_fingerprint_changes_the_key() {
         let job = fixtures::s1(Transport::Direct);
         let version = |text: &str, fingerprint: &str| Version {
             fingerprint: fingerprint.to_owned(),
@@ -185,6 +186,42 @@ mod tests {
             let failed = plain.of_failure();
             assert!(failed != plain && failed.engine == plain.engine && failed.digits.len() == DIGIT_COUNT);
         }
+    }
+
+    /// The digits of a job of one luminaire without the files of its engine.
+    fn digits(engine: &dyn Engine, job: &Job, files: &[SceneFile]) -> String {
+        hash_job(engine, &Version::without_fingerprint("1"), job, files).unwrap().digits
+    }
+
+    #[test]
+    fn a_setting_the_type_of_a_table_and_each_name_and_content_of_a_file_are_parts_of_a_key() {
+        let engines = all();
+        let radiance = engines.iter().find(|e| e.name() == "radiance").unwrap().as_ref();
+        let job = fixtures::s1(Transport::Direct);
+        // The form of a job leaves out the first two.
+        for setting in ["command", "procedures", "preset"] {
+            let mut other = job.clone();
+            other.settings.insert(setting.to_owned(), "draft".into());
+            assert_ne!(digits(radiance, &job, &[]), digits(radiance, &other, &[]), "{setting}");
+        }
+        // The form has type C alone. So a table of type B has that of its approximation in type C, which reads otherwise.
+        let text =
+            "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 3 3 2 2 0 0 0\n1 1 0\n-90 0 90\n-90 0 90\n0 0 0\n0 90 40\n0 0 0\n";
+        let photometry = luxproof_photometry::lm63::parse(text.as_bytes()).unwrap();
+        let mut of_type_b = job.clone();
+        of_type_b.scene.luminaires[0].photometry = fixtures::photometry(photometry.distribution);
+        let mut of_type_c = of_type_b.clone();
+        of_type_c.scene.luminaires[0] = of_type_b.scene.luminaires[0].in_type_c(TypeCLimits::default());
+        assert_eq!(ExternalJob::of(&of_type_b).to_json().unwrap(), ExternalJob::of(&of_type_c).to_json().unwrap());
+        assert_ne!(digits(radiance, &of_type_b, &[]), digits(radiance, &of_type_c, &[]));
+        let [plain, renamed, changed, moved] = [("a", "bc"), ("b", "bc"), ("a", "bd"), ("ab", "c")]
+            .map(|(name, content)| digits(radiance, &job, &[SceneFile::text(name, content)]));
+        assert!(plain != renamed && plain != changed && plain != moved);
+        // Zeros between the parts of two files are no part of one file.
+        let two = [SceneFile::text("a", "b"), SceneFile::text("c", "d")];
+        let zeros = "\0".repeat(8);
+        let one = [SceneFile::text("a", format!("b{zeros}c{zeros}d"))];
+        assert_ne!(digits(radiance, &job, &two), digits(radiance, &job, &one));
     }
 
     #[test]

@@ -200,6 +200,75 @@ fn a_meter_close_above_an_uplight_is_lit_though_no_corner_lights_it() {
 }
 
 #[test]
+fn a_meter_close_below_a_spot_is_lit_though_no_corner_lights_it() {
+    // The middle sees it straight below, the corners at 83 degrees, where the table is dark.
+    let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+    let table =
+        luxproof_photometry::LuminousIntensityDistribution::axial(vec![0.0, 30.0, 31.0], vec![500.0, 500.0, 0.0]);
+    let lamp = fixtures::luminaire("panel", DVec3::new(3.0, 2.0, 2.0), table.unwrap());
+    job.scene.luminaires =
+        vec![fixtures::with_opening(lamp, LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 })];
+    job.sensors = fixtures::sensors(&[[3.0, 2.0, 1.95]], DVec3::Z);
+    assert_eq!(Shortcut::of(&job).fill, [Fill::Rendered(0)]);
+}
+
+#[test]
+fn a_meter_in_the_dark_cone_of_one_corner_is_lit_by_others() {
+    // The table is dark below 30 degrees. The meter is straight below a corner, and 45 degrees from the next.
+    let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+    let table = luxproof_photometry::LuminousIntensityDistribution::axial(
+        vec![0.0, 29.0, 30.0, 90.0],
+        vec![0.0, 0.0, 500.0, 500.0],
+    );
+    let lamp = fixtures::luminaire("panel", DVec3::new(3.0, 2.0, 2.0), table.unwrap());
+    job.scene.luminaires =
+        vec![fixtures::with_opening(lamp, LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 })];
+    job.sensors = fixtures::sensors(&[[3.5, 2.5, 1.0]], DVec3::Z);
+    assert_eq!(Shortcut::of(&job).fill, [Fill::Rendered(0)]);
+}
+
+#[test]
+fn floor_and_ceiling_mirror_each_other_only_where_they_reflect_as_much() {
+    let size_m = DVec3::new(6.0, 4.0, 3.0);
+    let even = luxproof_photometry::LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0; 2]).unwrap();
+    for (ceiling, rendered) in [(0.7, 1), (0.2, 2)] {
+        let mut job = symmetric_job(size_m, CONVERGED);
+        job.scene.room = Some(fixtures::room(size_m, 0.7, 0.5, ceiling));
+        job.scene.luminaires = vec![fixtures::luminaire("lamp", 0.5 * size_m, even.clone())];
+        // Their places and normals have one symmetry, z to -z.
+        job.sensors = fixtures::sensors(&[[1.0, 1.0, 0.4], [1.0, 1.0, 2.6]], DVec3::X);
+        assert_eq!(holds(&job).job.sensors.len(), rendered, "{ceiling}");
+    }
+}
+
+/// A table of type B that is even between these vertical angles and these horizontal ones, and dark beyond.
+fn even_type_b(vertical_deg: [i32; 2], horizontal_deg: [i32; 2]) -> luxproof_photometry::LuminousIntensityDistribution {
+    let [vertical, horizontal] = [vertical_deg, horizontal_deg].map(|[a, b]| format!("{a} {b}"));
+    let text = format!(
+        "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 2 2 2 0 0 0\n1 1 0\n{vertical}\n{horizontal}\n300 300\n300 300\n"
+    );
+    luxproof_photometry::lm63::parse(text.as_bytes()).unwrap().distribution
+}
+
+#[test]
+fn a_small_patch_of_light_of_type_b_breaks_the_symmetry() {
+    for (vertical_deg, horizontal_deg, rendered) in [
+        ([-30, 30], [-40, 40], 4),
+        ([-30, 29], [-40, 40], 8),
+        ([-30, 30], [-40, 39], 8),
+        ([-30, 29], [-40, 39], 16),
+        ([40, 42], [20, 22], 16),
+        ([40, 42], [-1, 1], 8),
+    ] {
+        let table = even_type_b(vertical_deg, horizontal_deg);
+        let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), CONVERGED);
+        job.scene.luminaires[0].photometry = fixtures::photometry(table);
+        let found = Shortcut::of(&job).job.sensors.len();
+        assert_eq!(found, rendered, "{vertical_deg:?} {horizontal_deg:?}");
+    }
+}
+
+#[test]
 fn black_rooms_have_no_reflected_light_and_one_flat_surface_reflects_once() {
     let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), CONVERGED);
     job.scene.room = Some(fixtures::room(DVec3::new(6.0, 4.0, 3.0), 0.0, 0.0, 0.0));
