@@ -310,6 +310,7 @@ fn relative_error(reading: &Reading) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::undecided::explain_undecided;
+    use luxproof_model::Tolerance;
     use luxproof_process::random::normal;
     use luxproof_verdict::fixtures::{built_in, task};
 
@@ -378,6 +379,36 @@ mod tests {
 
     fn run(deviations: &[f64], seconds: f64, blocks: usize, seed: u64) -> (Vec<Verdict>, Vec<StageRequest>, Recording) {
         run_within(deviations, (budget_of(1.0), budget_of(seconds)), (0.004, blocks), seed)
+    }
+
+    #[test]
+    fn a_reference_blurs_where_its_interval_takes_more_than_half_of_the_way_to_the_tolerance() {
+        let exact = recording("simulator", &[Estimate::exact(1.0)]);
+        let subject = recording("radiance", &[Estimate::exact(1.01)]);
+        let compared = built_in().compare_one(&task(1), &subject, &[&exact, &subject]).remove(0);
+        // Tolerances of .03: .02 of the way is left on either side of it. Half of that is two standard uncertainties of .005.
+        for (deviation, uncertainty, is_blurred) in
+            [(0.01, 0.0051, true), (0.01, 0.0049, false), (-0.05, 0.0051, true), (-0.05, 0.0049, false)]
+        {
+            let parts = vec![Component::normal(Source::Reference, uncertainty, None)];
+            let budget = ErrorBudget { coverage_factor: 2.0, ..error_budget::budget(parts, INTERVAL_TAIL) };
+            let tolerance = Tolerance { relative: 0.03, absolute: 0.0 };
+            let (budget, deviation) = (Some(budget), Some(deviation));
+            let comparison = Comparison { budget, deviation, tolerance, ..compared.clone() };
+            assert_eq!(is_blurred_by_reference(&comparison), Some(is_blurred), "{deviation:?} {uncertainty}");
+        }
+    }
+
+    #[test]
+    fn savings_grow_with_the_square_of_the_error() {
+        // An error of 2 % where 1 % is asked for: four times the samples, unless the seconds allow fewer.
+        let estimate = Estimate { value: 100.0, uncertainty: Uncertainty::sampled(2.0, None) };
+        let subject = Recording { stages: vec![2], work_s: Some(10.0), ..recording("radiance", &[estimate]) };
+        for (seconds, times) in [(600.0, "where 4.0 times"), (30.0, "where 3.0 times")] {
+            let text = describe_savings(&subject, Budget { relative_error: 0.01, seconds }).unwrap();
+            assert!(text.contains(times) && text.contains("stage 2 of 4"), "{text}");
+        }
+        assert_eq!(describe_savings(&subject, Budget { relative_error: 0.01, seconds: 14.0 }), None);
     }
 
     #[test]

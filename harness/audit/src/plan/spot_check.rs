@@ -186,4 +186,25 @@ mod tests {
             assert!(error.contains("m[2]"), "{error}");
         }
     }
+    /// A measurement of one value within a bound, filled in or checked.
+    fn bounded(value: f64, bound: f64) -> Measurement {
+        let estimate = Estimate { value, uncertainty: Uncertainty::Bound(bound) };
+        Measurement { estimates: vec![estimate; 2], ..Measurement::default() }
+    }
+
+    #[test]
+    fn bounds_of_both_readings_and_the_declared_part_of_the_larger_are_allowed() {
+        let mut run = run(2);
+        run.spot_check = vec![1];
+        // Bounds of .1 and .2 lx, and rounding of a ten-thousandth.
+        for (checked, is_allowed) in [(5.29, true), (4.71, true), (5.31, false), (4.69, false)] {
+            assert_eq!(run.hold(&bounded(5.0, 0.1), &bounded(checked, 0.2)).is_ok(), is_allowed, "{checked}");
+        }
+        // A tenth of 5.54 lx is .554 lx, and of 5.57 lx it is .557 lx.
+        run.declared = 0.1;
+        for (other, is_allowed) in [(5.54, true), (5.57, false)] {
+            assert_eq!(run.hold(&bounded(5.0, 0.0), &bounded(other, 0.0)).is_ok(), is_allowed, "{other}");
+            assert_eq!(run.hold(&bounded(other, 0.0), &bounded(5.0, 0.0)).is_ok(), is_allowed, "{other}");
+        }
+    }
 }
