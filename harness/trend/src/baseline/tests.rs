@@ -217,6 +217,24 @@ fn exact_values_may_differ_by_single_precision_only_and_what_is_no_number_is_a_c
 }
 
 #[test]
+fn exact_values_may_differ_by_single_precision_of_the_larger() {
+    // A millionth of the larger value is 1.0000010000005e-6.
+    let [small, large] = [1.0, 1.000_001_000_000_5].map(|value| entry(&[value, 50.0], None));
+    assert_eq!((state(&small, &large), state(&large, &small)), (State::Unchanged, State::Unchanged));
+}
+
+#[test]
+fn a_change_has_the_error_and_the_degrees_of_freedom_of_both_sides() {
+    let [mut before, mut now] = [entry(&[100.0], None), entry(&[101.0], None)];
+    before.readings[0].uncertainty = Uncertainty::sampled(1.0, Some(2.0));
+    now.readings[0].uncertainty = Uncertainty::sampled(3.0, Some(18.0));
+    let meter = &compared(&[&before], &[&now]).entries[0].meters[0];
+    // GUM G.2b: (1 + 9)^2 / (1^2 / 2 + 9^2 / 18).
+    assert!((meter.uncertainty - 10.0_f64.sqrt()).abs() < 1e-12, "{meter:?}");
+    assert!((meter.degrees_of_freedom.unwrap() - 20.0).abs() < 1e-9, "{meter:?}");
+}
+
+#[test]
 fn a_baseline_of_another_task_is_refused_and_that_of_another_version_or_setting_is_compared() {
     let a = entry(&[100.0, 50.0], Some(1.0));
     let other_tasks = [
