@@ -219,3 +219,18 @@ fn each_set_of_a_recording_has_its_own_figures_and_the_calibration_has_none() {
     subject.key.procedure = ProcedureId::Furnace;
     assert_eq!(built_in().statistics(&[], &[subject]), []);
 }
+
+#[test]
+fn figures_of_a_set_spend_the_share_of_a_sampled_meter() {
+    // The mean of a sampled and of an exact meter has half of the error. Of four stages each may spend a quarter of 2.275 % on
+    // either side, which a normal distribution has beyond 2.5310 standard deviations; one stage may spend it all, beyond 2.
+    let exact = recording("simulator", &[Estimate::exact(100.0); 2]);
+    for (stages, standard_errors) in [(vec![1, 1], 2.530_960_494), (vec![], 2.0)] {
+        let read = [sampled(100.0, 1.0), Estimate::exact(100.0)];
+        let subject = Recording { stages, ..recording("radiance", &read) };
+        let comparisons = built_in().compare(&task(2), &[&exact, &subject]);
+        let found = built_in().statistics(&comparisons, &[subject]);
+        let mean = &found[0].agreement.as_ref().unwrap().mean;
+        assert!((mean.expanded - 0.5 * standard_errors).abs() < 1e-6, "{mean:?}");
+    }
+}
